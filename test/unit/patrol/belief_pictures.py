@@ -58,7 +58,7 @@ def box_of(
     ahead = math.atan2(y - eye.y, x - eye.x) - eye.yaw
     column = COLUMNS / 2.0 - FOCAL * math.tan(ahead)
     half, high = 0.5 * FOCAL * wide / away, FOCAL * tall / away
-    measured = Measured(x=x, y=y, error=0.15, away=away, top=tall, height=tall, width=wide)
+    measured = Measured(x=x, y=y, error=0.15, away=away, top=tall, height=tall, width=wide, is_flat=False)
     bottom = 240 + FOCAL * 0.2 / away
     return Box(
         label="person",

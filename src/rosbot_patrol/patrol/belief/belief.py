@@ -36,6 +36,7 @@ _BODY = 0.4  # [m] in front of a place its own body may end a beam
 _VIEW_EDGE = 0.1  # [rad] at the image borders where a miss says nothing
 _MOST = 60  # hypotheses
 _TRACK_ERROR = 0.2  # [m] error of a lidar track's place
+_STAYS = 3.0  # [s] for which one whom the lidar saw move stays at a place, on average
 _FEWEST = 2  # boxes that confirm: one picture may be spoilt
 _LIKELY = 0.5  # posterior of somebody who tells from which others they are apart
 _EPISODE = 1.0  # [s] without a box, after which a box without a place is of something else
@@ -154,7 +155,7 @@ class Belief:
                 b.together[a.number] += 1
         for hypothesis in self.hypotheses:
             if hypothesis.is_placed and not any(hypothesis is each for each in shown):
-                self._miss(hypothesis, eye, view)
+                self._miss(hypothesis, eye, view, at)
         self._merge()
         self._forget()
         return shown
@@ -189,6 +190,8 @@ class Belief:
                 known = self._begin(place, spread, track.at)
             elif track.at > known.at:
                 known.move(place, spread, track.at, self.params)
+            if not known.moved:  # pictures of the place from before it came tell nothing
+                known.sides = [side for side in known.sides if side.score > 0.0]
             known.moved = math.log(self.params.motion_ratio)
 
     def _begin(
@@ -233,20 +236,22 @@ class Belief:
         within = self.params.outside_after + hypothesis.error
         return None if self.floor.nearest(self.floor.free, x, y, within) is not None else Veto.OUTSIDE
 
-    def _miss(self, hypothesis: Hypothesis, eye: Eye, view: PictureView) -> None:
+    def _miss(self, hypothesis: Hypothesis, eye: Eye, view: PictureView, at: float) -> None:
         seen = self._in_view(hypothesis, eye, view.sight)
+        if hypothesis.moved and hypothesis.boxes:  # the place it has left tells nothing
+            seen *= math.exp(-max(at - hypothesis.at, 0.0) / _STAYS)
         if seen <= 0.0:
             return
         _, away = hypothesis.from_place(eye.pose)
         focal = 0.5 * eye.columns / math.tan(0.5 * eye.width)
-        at = Condition(focal * hypothesis.height / max(away, 0.3) / eye.columns, is_dark=view.is_dark)
-        miss = self.likelihoods.miss(at, seen, is_near=away < self.params.whole_from)
+        condition = Condition(focal * hypothesis.height / max(away, 0.3) / eye.columns, is_dark=view.is_dark)
+        miss = self.likelihoods.miss(condition, seen, is_near=away < self.params.whole_from)
         hypothesis.take(eye.pose, miss, self.likelihoods.calibration, self.params)
 
     def _in_view(self, hypothesis: Hypothesis, eye: Eye, sight: Sight | None) -> float:
         """Probability that its place was in view: the share of five points of its spread.
 
-        That it has walked on is left out: then it is seen elsewhere, or the lidar sees it move.
+        That it has walked on is left out.
         """
         if sight is None:
             return 0.0

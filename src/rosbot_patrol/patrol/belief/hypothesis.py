@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _SAME_EYE = 0.3  # [m] cameras this near to each other see the same side, wherever the object is
 _TOGETHER = 2  # pictures of two persons that tell them apart: one may be spoilt
 _HEIGHT = 1.3  # [m] visible height that is expected before one was measured
+_UNSEEN = 0.03  # probability that a network never finds somebody from one side: behind furniture, in a rare pose
 
 
 @dataclass
@@ -39,17 +40,21 @@ class Side:
     A Polya urn (`urn`) models the pictures of one side: each outcome raises its own later probability. A second picture
     with the same outcome adds little if pictures are much alike (rho near 1), and its full weight if independent.
 
+    However many pictures show nobody, a person there may be one whom the network never finds from this side: the
+    log-likelihood ratio has a lower limit.
+
     Attributes:
         eye: the camera when the side was first seen from there.
         counts: pictures with each outcome, as far as the place was in view.
-        near, whole: log-likelihood ratio of what pictures from near and of the whole say, of a person against nobody.
+        near_sum, whole_sum: log-likelihood ratio of what pictures from near and of the whole say, of a person against
+            nobody.
         sizes, size_total: boxes, and sum of what their sizes say of a person against a look-alike.
     """
 
     eye: Pose2D
     counts: Array = field(default_factory=lambda: np.zeros(len(EDGES)))
-    near: float = 0.0
-    whole: float = 0.0
+    near_sum: float = 0.0
+    whole_sum: float = 0.0
     sizes: int = 0
     size_total: float = 0.0
 
@@ -57,21 +62,31 @@ class Side:
         """Take one picture's evidence."""
         told = self.told(evidence, calibration)
         if evidence.is_near:
-            self.near += told
+            self.near_sum += told
         else:
-            self.whole += told
+            self.whole_sum += told
         self.counts[evidence.outcome] += evidence.weight
         if evidence.size is not None:
             self.sizes += 1
             self.size_total += evidence.size
 
     def told(self, evidence: Evidence, calibration: Calibration) -> float:
-        """What a further picture would add to `near` or `whole`."""
+        """What a further picture would add to `near_sum` or `whole_sum`."""
         person, nobody = (
             1.0 - evidence.weight * (1.0 - urn(self.counts, evidence.outcome, chances, rho))
             for chances, rho in ((evidence.person, calibration.rho_person), (evidence.nobody, calibration.rho_nobody))
         )
         return math.log(person / nobody)
+
+    @property
+    def near(self) -> float:
+        """Log-likelihood ratio of the pictures from near."""
+        return max(self.near_sum, math.log(_UNSEEN))
+
+    @property
+    def whole(self) -> float:
+        """Log-likelihood ratio of the pictures of the whole."""
+        return max(self.whole_sum, math.log(_UNSEEN))
 
     @property
     def score(self) -> float:

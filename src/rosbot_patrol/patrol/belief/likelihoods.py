@@ -22,7 +22,8 @@ from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 Array = NDArray[np.float64]
 
 _LEAST = 0.02  # smallest q, and 1 less the largest: no single measurement is sure
-_LEGS = 0.7  # largest q of legs alone: a box around one leg of a dog looks like them
+_PART = 0.7  # largest q of what a pet or a picture may show, too: short legs; a size without knowing if it is flat
+_DOGS_LEG, _LEG_SPREAD = 0.5, 0.05  # [m] length of the longest legs of dogs, and its spread
 _NEAR_ERROR = 0.35  # [m] error of a place by the floor up to which it tells the size
 _LOWEST = 16  # [px] height below which a box shows nothing
 _SHAPES = 0.15, 8.0  # height over width that a box of an object can have
@@ -113,8 +114,12 @@ class Likelihoods:
         if found is None:
             return None, False, None
         q, veto = found
-        if box.measured is not None and box.measured.has_legs:
-            q = min(q, _LEGS)
+        m = box.measured
+        if m is not None and box.label == "person":
+            if m.has_legs:
+                q = min(q, max(_PART, _taller_than_a_leg(m)))
+            elif m.is_flat is None and m.source != "lidar":  # what the lidar sees stands out from the wall
+                q = min(q, _PART)
         return math.log(q / (1.0 - q)), False, veto
 
     def is_near(self, box: Box) -> bool:
@@ -178,6 +183,12 @@ def _shares(box: Box, m: Measured, p: BeliefParams) -> dict[Veto, float]:
     if not (goes_on(box, m) or m.is_cut_aside):  # else it is larger than what the picture shows
         shares[Veto.SMALL] = max(_normal((m.height - p.person_height_min) / error), lying)
     return shares
+
+
+def _taller_than_a_leg(m: Measured) -> float:
+    """Probability that what stands straight up to a height is no leg of a large dog."""
+    error = math.hypot(_LEG_SPREAD, m.error / max(m.away, 0.5) * max(m.top, 0.5))
+    return _normal((m.top - _DOGS_LEG) / error)
 
 
 def _normal(z: float) -> float:

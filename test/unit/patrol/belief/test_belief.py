@@ -151,6 +151,31 @@ def test_motion_makes_a_person_likelier() -> None:
     assert moving.posterior > still.posterior
 
 
+def test_a_place_that_a_walker_has_left_tells_nothing() -> None:
+    walked, stood = Seen(), Seen()
+    for seen in (walked, stood):
+        seen.see(WEST, box_of(WEST, score=0.5))
+    walked.belief.motion([track(0.1, 0.0, 0.2)])
+    before = walked.posterior
+    for seen in (walked, stood):
+        seen.now += 20.0
+        seen.see(SOUTH, pictures=30)
+    assert walked.posterior == pytest.approx(before, abs=0.01)
+    assert stood.posterior < 0.5 * before
+
+
+def test_a_place_that_was_empty_before_somebody_came_is_no_evidence_against_them() -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST, score=0.15))
+    seen.see(WEST, pictures=40)
+    seen.see(SOUTH, pictures=40)
+    assert seen.posterior < 0.001
+    seen.belief.motion([track(0.1, 0.0, seen.now)])
+    assert seen.posterior > 0.1
+    (found,) = seen.see(EAST, box_of(EAST), pictures=10)
+    assert found.is_confirmed
+
+
 def test_start_forgets() -> None:
     seen = Seen()
     seen.see(WEST, box_of(WEST), pictures=10)
@@ -258,6 +283,13 @@ def test_legs_from_one_side_confirm_nobody_and_from_two_a_person() -> None:
     for eye, is_enough in ((Pose2D(-0.8, 0.0, 0.0), False), (Pose2D(0.0, -0.8, math.pi / 2.0), True)):
         seen.see(eye, box_of(eye, tall=0.5, is_cut_above=True, has_legs=True), pictures=40)
         assert seen.only.is_confirmed == is_enough
+
+
+def test_legs_longer_than_a_dogs_confirm_a_person_from_one_side() -> None:
+    """Somebody stands in the robot's way, 1.1 m off: it can look from no other side."""
+    seen, eye = Seen(), Pose2D(-1.1, 0.0, 0.0)
+    seen.see(eye, box_of(eye, tall=0.68, is_cut_above=True, has_legs=True), pictures=20)
+    assert seen.only.is_confirmed
 
 
 def test_two_boxes_around_one_person_are_one_person() -> None:

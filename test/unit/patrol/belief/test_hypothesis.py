@@ -91,6 +91,14 @@ def test_misses_of_one_side_agree() -> None:
     assert ten > 2.0 * one
 
 
+def test_one_side_alone_never_says_that_surely_nobody_is_there() -> None:
+    """A network may find nobody in a rare pose, or behind a plant, in a hundred pictures alike."""
+    hundred = side_of(*[0.0] * 100)
+    assert hundred.score == pytest.approx(math.log(0.03))
+    assert whole(hundred).posterior(PARAMS) < 0.001
+    assert whole(hundred, hundred).whole == pytest.approx(2.0 * math.log(0.03))
+
+
 def test_a_person_who_is_missed_often_and_seen_now_and_then_is_still_likelier_than_nobody() -> None:
     assert side_of(*[0.0] * 10, 0.7, 0.7).score > 0.0
 
@@ -184,7 +192,7 @@ def test_absorbing_counts_a_side_once() -> None:
     a.absorb(b, PARAMS)
     assert len(a.sides) == 1
     assert a.whole == pytest.approx(side_of(0.9, 0.9).score)
-    other = whole(Side(EAST, whole=2.0))
+    other = whole(Side(EAST, whole_sum=2.0))
     a.absorb(other, PARAMS)
     assert a.whole == pytest.approx(side_of(0.9, 0.9).score + 2.0)
 

@@ -110,3 +110,14 @@ def test_a_part_that_is_as_tall_as_a_pet_may_be_says_little(cut: str) -> None:
     assert tall is not None
     assert 0.0 < low < 1.5
     assert tall > 3.0
+
+
+def test_a_size_says_little_where_it_may_be_that_of_a_picture() -> None:
+    """A poster across the hall has a person's size, and is too far off for the depth camera to tell that it is flat."""
+    poster, body = (judge().box(box_of(WEST, tall=1.7, is_flat=flat), EYE).size for flat in (None, False))
+    by_lidar = judge().box(box_of(WEST, tall=1.7, is_flat=None, source="lidar"), EYE).size
+    assert poster is not None
+    assert 0.0 < poster < 1.0
+    assert by_lidar == body
+    assert body is not None
+    assert body > 3.0
