@@ -13,7 +13,6 @@ import argparse
 import json
 import sys
 import time
-import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -22,12 +21,12 @@ from pathlib import Path
 from rosgraph.names import get_ros_namespace
 
 from rosbot_patrol.alerts.records.disk_errors import errors_of
-from rosbot_patrol.alerts.records.files import REPORT
 from rosbot_patrol.alerts.records.incident import NO_ROOM, VERDICTS, Incident, Place, clock_text, incident_to_plain
 from rosbot_patrol.alerts.records.query import Found, Query, find_incidents
 from rosbot_patrol.alerts.records.retention import RetentionParams, prune
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.records.verify import verify
+from rosbot_patrol.alerts.report.export import export_incident
 from rosbot_patrol.alerts.report.page import make_report
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StoreError
@@ -247,18 +246,8 @@ def _report(store: IncidentStore, given: argparse.Namespace) -> int:
 
 
 def _export(store: IncidentStore, given: argparse.Namespace) -> int:
-    incident = _get(store, given.id)
-    link = store.link(incident.id)
-    record = incident_to_plain(incident) if link is None or link.body is None else json.loads(link.body)
-    proof = {key: value for key, value in vars(link).items() if key != "body"} if link else None
-    with errors_of(given.file), zipfile.ZipFile(given.file, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("record.json", json.dumps(record, ensure_ascii=False, indent=1))
-        archive.writestr("link.json", json.dumps(proof, indent=1))
-        if link is not None and link.body is not None:
-            archive.writestr("record.canonical.json", link.body)  # the digest covers these bytes
-        archive.writestr(REPORT, make_report(store, incident))
-        for file in incident.files:
-            archive.writestr(file.name, store.folder.read(incident.id, file.name))
+    with errors_of(given.file), given.file.open("wb") as target:
+        export_incident(store, _get(store, given.id), target)
     print(given.file)
     return 0
 
