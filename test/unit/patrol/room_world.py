@@ -72,7 +72,7 @@ class World:
             params,
             views=self.views,
             viewpoints=self.views.fallback_viewpoints,
-            known=known,
+            known=lambda: known,
             network=good_network,
             memory=memory,
         )

@@ -66,7 +66,7 @@ class IntruderDecision:
     Args:
         rooms: of the points file.
         params: how sure to be.
-        known: objects that look like somebody.
+        known: gives the objects that look like somebody, asked at each `start`.
         network: gives the network that runs, asked at each `start`.
 
     Attributes:
@@ -77,7 +77,7 @@ class IntruderDecision:
         self,
         rooms: Rooms,
         params: IntruderParams,
-        known: tuple[KnownObject, ...] = (),
+        known: Callable[[], tuple[KnownObject, ...]] = tuple,
         network: Callable[[], Network] = Network,
     ) -> None:
         self._rooms, self._params, self._known, self._network = rooms, params, known, network
@@ -91,7 +91,7 @@ class IntruderDecision:
             network.calibration,
             self._params.belief,
             threshold=network.threshold,
-            known=self._known,
+            known=self._known(),
             classes=self._params.alarm_classes,
         )
 

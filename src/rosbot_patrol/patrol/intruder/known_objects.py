@@ -1,22 +1,37 @@
-"""The file of things in the house that look like somebody: a statue, a coat stand, a poster without depth.
+"""Files of things in the house that look like somebody: a statue, a coat stand, a poster without depth.
 
     objects:
       - {name: statue in the hall, x: 2.1, y: 0.4, radius: 0.5, label: person}
 
 `label` may be left out: then no class of object alarms there.
+
+The owner writes one such file. The console adds to another, FOUND_FALSE in the state folder, when somebody calls an
+incident a false alarm.
 """
 
 from __future__ import annotations
 
+import io
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
+from rosbot_patrol.files import write_atomic
 from rosbot_patrol.patrol.records.inputs import Measured
 from rosbot_patrol.yaml_files import read_mapping
+
+FOUND_FALSE = "known_objects.yaml"
+
+_HEAD = (
+    "# Things that look like somebody, from false alarms. A line may be changed or removed; the next mission obeys.\n"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,3 +89,63 @@ def _known(tree: Any, name: str) -> KnownObject:
         raise ParamError(name, f"is {tree!r}, expected name, x, y, and maybe radius and label")
     entry = params.load(_Entry, tree, name=name)
     return KnownObject(x=entry.x, y=entry.y, radius=entry.radius, name=entry.name.strip(), label=entry.label)
+
+
+def add_known(path: Path, thing: KnownObject) -> None:
+    """Add an object to a file, which is made where it is missing; comments stay.
+
+    Raises:
+        ParamError: the file, or the object, is wrong; the file is as it was.
+        OSError: the disk does not take it.
+    """
+    before = path.read_text("utf-8") if path.exists() else f"{_HEAD}objects:\n"
+    if path.exists():
+        load_known(path)
+    tree = {"name": thing.name, "x": thing.x, "y": thing.y, "radius": thing.radius}
+    if thing.label:
+        tree["label"] = thing.label
+    _known(tree, "the object: ")
+    editor = YAML()
+    editor.width = 200
+    content = editor.load(before) or {}
+    content["objects"] = content.get("objects") or CommentedSeq()
+    line = CommentedMap(tree)
+    line.fa.set_flow_style()
+    content["objects"].append(line)
+    written = io.StringIO()
+    editor.dump(content, written)
+    write_atomic(path, written.getvalue().encode())
+
+
+class KnownObjects:
+    """The objects of the owner's file, and of the console's, which is read again whenever it has changed.
+
+    Args:
+        path: of the owner's file, "" for none.
+        found_false: of the console's file.
+        say: takes the problem of the console's file, "" for none; its last good state stays in use.
+
+    Raises:
+        ParamError: the owner's file cannot be used.
+    """
+
+    def __init__(self, path: str, found_false: Path, say: Callable[[str], None]) -> None:
+        self._own, self._path, self._say = load_known(path), found_false, say
+        self._found: tuple[KnownObject, ...] = ()
+        self._read: tuple[int, int] | None = None
+
+    def __call__(self) -> tuple[KnownObject, ...]:
+        """All objects now."""
+        try:
+            state = self._path.stat()
+        except OSError:
+            self._found, self._read = (), None
+            return self._own
+        if (state.st_mtime_ns, state.st_size) != self._read:
+            self._read = (state.st_mtime_ns, state.st_size)
+            try:
+                self._found = load_known(self._path)
+                self._say("")
+            except ParamError as err:
+                self._say(str(err))
+        return self._own + self._found

@@ -72,7 +72,7 @@ class PatrolManager:
         needs_camera: pictures come in, so that a silent camera can be told.
         views: what was seen of a room, and from where to see the rest.
         viewpoints: further poses that show a room whose own point cannot be reached.
-        known: objects that look like somebody.
+        known: gives the objects that look like somebody, asked at each mission's start.
         network: gives the network that runs, asked at the begin of each mission.
     """
 
@@ -85,7 +85,7 @@ class PatrolManager:
         needs_camera: bool = True,
         views: Views | None = None,
         viewpoints: Viewpoints | None = None,
-        known: tuple[KnownObject, ...] = (),
+        known: Callable[[], tuple[KnownObject, ...]] = tuple,
         network: Callable[[], Network] = Network,
     ) -> None:
         self.params = params = params or ManagerParams()

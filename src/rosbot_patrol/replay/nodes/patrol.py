@@ -137,7 +137,7 @@ class PatrolReplay:
             needs_camera=CAMERA in names,
             views=views,
             viewpoints=views.fallback_viewpoints,
-            known=self._known,
+            known=lambda: self._known,
             network=lambda: self._network,
         )
 

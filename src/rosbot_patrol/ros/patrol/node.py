@@ -39,7 +39,7 @@ from rosbot_patrol.patrol.guard.arming import Arming, ArmingRules, load_rules, r
 from rosbot_patrol.patrol.guard.emergency import EmergencyStop
 from rosbot_patrol.patrol.guard.schedule import Schedule, load_schedule
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
-from rosbot_patrol.patrol.intruder.known_objects import load_known
+from rosbot_patrol.patrol.intruder.known_objects import FOUND_FALSE, KnownObjects
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import NodeParams
 from rosbot_patrol.patrol.mission.resume import PatrolStore
@@ -71,7 +71,7 @@ from rosbot_patrol.ros.patrol.settings import (
     load_or_say,
 )
 from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
-from rosbot_patrol.ros.runtime.diagnostics import Health
+from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.runtime.node import Loop, now, run_node
 from rosbot_patrol.ros.runtime.private_files import keep_private
 from rosbot_patrol.ros.runtime.state_folder import claim_folder, state_folder
@@ -124,7 +124,7 @@ class PatrolNode:
             needs_camera=self.pictures.is_wanted,
             views=views,
             viewpoints=views.fallback_viewpoints,
-            known=load_known(self.params.known_objects),
+            known=KnownObjects(self.params.known_objects, folder / FOUND_FALSE, self._say_known),
             network=RunningNetwork(self.params.network, self.params.calibrations, self.health),
         )
         how_many, how_often = count_of(len(rooms), "room"), count_of(len(rounds), "round")
@@ -245,6 +245,12 @@ class PatrolNode:
             for entry in due
             for room in entry.rooms
         )
+
+    def _say_known(self, problem: str) -> None:
+        """Report the file of known objects that the console writes."""
+        if problem:
+            log.error("%s; the objects of its last good state stay known", problem)
+        self.health.set("known objects", WARN if problem else OK, problem or "the file is well")
 
     def _tell_owner(self, word: OwnerMessage) -> None:
         self.desk.follow(Commands(words=(word,)))
