@@ -33,10 +33,10 @@ def test_person_makes_one_mail_with_picture(house):
     wait_until(lambda: any(a.delivered for a in house.alerts), 20, "the delivery")
     assert [a.delivered for a in house.alerts] == [False, True]
     (mail,) = house.mails()
-    assert mail["Subject"] == "rosbot patrol node"
+    assert mail["Subject"].startswith("Person in square room behind the door, ")
     parts = list(mail.walk())
     text = parts[2].get_payload(decode=True).decode()
-    assert text.startswith("I have found something strange it could be invader")
+    assert text.startswith("Person seen in room 2 (square room behind the door).")
     assert "2 (square room behind the door)" in text
     picture = parts[-1]
     assert picture.get_content_type() == "image/jpeg"

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from rosbot_patrol.alerts.channels.channel import Channel, Pace
 from rosbot_patrol.alerts.channels.mail import make_envelope
-from rosbot_patrol.alerts.channels.maildir import MaildirTransport
-from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
+from rosbot_patrol.alerts.channels.transports.maildir import MaildirTransport
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpServer, SmtpTransport
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox

@@ -14,9 +14,9 @@ from smtp_server import SmtpServer
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError
 from rosbot_patrol.alerts.channels.mail import make_envelope
-from rosbot_patrol.alerts.channels.smtp import SmtpServer as Server
-from rosbot_patrol.alerts.channels.smtp import SmtpTransport
-from rosbot_patrol.alerts.channels.webhook import WebAddress, WebhookTransport
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpServer as Server
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpTransport
+from rosbot_patrol.alerts.channels.transports.webhook import WebAddress, WebhookTransport
 
 SECRET, KEY = "Xk29-topSecret_hook", "q7%2BKEYvalue"
 PATH = f"/api/webhooks/{SECRET}?key={KEY}&x=1"

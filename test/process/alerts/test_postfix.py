@@ -12,8 +12,8 @@ from rosbot_patrol.alerts.channels.channel import DeliveryError
 from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.params import MailParams
-from rosbot_patrol.alerts.channels.sendmail import SendmailTransport
-from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
+from rosbot_patrol.alerts.channels.transports.sendmail import SendmailTransport
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpServer, SmtpTransport
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox

@@ -12,7 +12,7 @@ from post import Time, channel, deliver_all, dispatcher, notice
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import make_envelope
-from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpServer, SmtpTransport
 from rosbot_patrol.alerts.outbox.notice import Notice
 
 smtpd = pytest.importorskip("aiosmtpd.smtp", reason="needs python3-aiosmtpd")

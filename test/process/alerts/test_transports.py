@@ -7,9 +7,9 @@ import pytest
 from smtp_server import SmtpServer
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
-from rosbot_patrol.alerts.channels.sendmail import SendmailTransport
-from rosbot_patrol.alerts.channels.smtp import SmtpServer as Server
-from rosbot_patrol.alerts.channels.smtp import SmtpTransport
+from rosbot_patrol.alerts.channels.transports.sendmail import SendmailTransport
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpServer as Server
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpTransport
 from rosbot_patrol.alerts.outbox.incident_notices import incident_notice
 
 
@@ -109,7 +109,7 @@ def test_sendmail_gets_the_mail_and_the_recipients(tmp_path, program, told, enve
     assert (tmp_path / "args").read_text().split() == ["-i", "-f", "robot@example.org", "--", "owner@example.org"]
     text = (tmp_path / "mail").read_bytes()
     assert b"\r\n" not in text
-    assert b"Subject: rosbot patrol node\n" in text
+    assert b"Subject: Person in " in text
 
 
 @pytest.mark.parametrize(

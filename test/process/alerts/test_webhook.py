@@ -11,7 +11,7 @@ from certificate import make_certificate
 from post import notice
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
-from rosbot_patrol.alerts.channels.webhook import WebAddress, WebhookTransport, check_url, sign
+from rosbot_patrol.alerts.channels.transports.webhook import WebAddress, WebhookTransport, check_url, sign
 
 WALL = 1_790_000_000.5
 

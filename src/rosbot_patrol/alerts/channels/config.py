@@ -13,18 +13,18 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
 from rosbot_patrol.alerts.channels.channel import Channel, Pace, Transport
 from rosbot_patrol.alerts.channels.mail import Envelope, make_envelope
-from rosbot_patrol.alerts.channels.maildir import MaildirTransport
 from rosbot_patrol.alerts.channels.network_words import is_loopback
 from rosbot_patrol.alerts.channels.params import (
     PASSWORD_VARIABLE,
     SPECS,
+    AppriseSpec,
     ChannelSpec,
     MaildirSpec,
     MailParams,
@@ -33,9 +33,11 @@ from rosbot_patrol.alerts.channels.params import (
     WebhookSpec,
 )
 from rosbot_patrol.alerts.channels.secrets_on_disk import read_secret, refuse_secrets, warn_where_open
-from rosbot_patrol.alerts.channels.sendmail import SENDMAILS, SendmailTransport, find_sendmail
-from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
-from rosbot_patrol.alerts.channels.webhook import WebAddress, WebhookTransport
+from rosbot_patrol.alerts.channels.transports.apprise import AppriseTransport, NoService
+from rosbot_patrol.alerts.channels.transports.maildir import MaildirTransport
+from rosbot_patrol.alerts.channels.transports.sendmail import SENDMAILS, SendmailTransport, find_sendmail
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpServer, SmtpTransport
+from rosbot_patrol.alerts.channels.transports.webhook import WebAddress, WebhookTransport
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import load_strict, unknown_name
 from rosbot_patrol.yaml_files import read_mapping
@@ -135,7 +137,7 @@ def _default_channels(params: MailParams, around: Surroundings, prefix: str) -> 
         kind = "sendmail" if envelope.is_real and find_sendmail(params.sendmail) else "maildir"
     common: dict[str, Any] = {"type": kind, "timeout": params.mail_timeout}
     common |= {"interval": params.mail_interval, "retry": params.mail_retry}
-    common |= {"to": params.email_to, "sender": params.email_from}
+    common |= {"to": params.email_to, "sender": params.email_from, "style": params.mail_style}
     specs: dict[str, ChannelSpec] = {
         "maildir": MaildirSpec(**common, folder=params.maildir),
         "sendmail": SendmailSpec(**common, program=params.sendmail),
@@ -166,13 +168,15 @@ class _Maker:
         """The transports of a channel by recipient, "" for one without recipients; raises ParamError."""
         if isinstance(spec, MaildirSpec):
             folder = Path(spec.folder).expanduser() if spec.folder else self._around.home / "rosbot_patrol" / "mail"
-            return {"": MaildirTransport(folder, self.envelope(spec.to, spec.sender))}
+            return {"": MaildirTransport(folder, self._styled(spec))}
         if isinstance(spec, SendmailSpec):
             return self._sendmail(spec)
         if isinstance(spec, SmtpSpec):
             return self._smtp(spec)
         if isinstance(spec, WebhookSpec):
             return {"": self._webhook(spec, name)}
+        if isinstance(spec, AppriseSpec):
+            return {"": self._apprise(spec, name)}
         raise TypeError(type(spec))
 
     def envelope(self, to: str, sender: str) -> Envelope:
@@ -182,21 +186,24 @@ class _Maker:
     def _name(self, key: str) -> str:
         return self._prefix + self._names.get(key, key)
 
-    def _real_envelope(self, to: str, sender: str, kind: str) -> Envelope:
-        envelope = self.envelope(to, sender)
+    def _styled(self, spec: MaildirSpec | SendmailSpec | SmtpSpec) -> Envelope:
+        return replace(self.envelope(spec.to, spec.sender), is_tutorial=spec.style == "tutorial")
+
+    def _real_envelope(self, spec: SendmailSpec | SmtpSpec, kind: str) -> Envelope:
+        envelope = self._styled(spec)
         if not envelope.is_real:
-            raise ParamError(self._name("to"), f"expected a real address for {kind}, got {to!r}")
+            raise ParamError(self._name("to"), f"expected a real address for {kind}, got {spec.to!r}")
         return envelope
 
     def _sendmail(self, spec: SendmailSpec) -> dict[str, Transport]:
-        envelope = self._real_envelope(spec.to, spec.sender, "sendmail")
+        envelope = self._real_envelope(spec, "sendmail")
         program = find_sendmail(spec.program)
         if program is None:
             raise ParamError(self._name("program"), f"no program at {spec.program or ' or '.join(SENDMAILS)}")
         return {copy.recipient: SendmailTransport(program, copy, spec.timeout) for copy in envelope.copies()}
 
     def _smtp(self, spec: SmtpSpec) -> dict[str, Transport]:
-        envelope = self._real_envelope(spec.to, spec.sender, "smtp")
+        envelope = self._real_envelope(spec, "smtp")
         if spec.user and spec.security not in ("starttls", "tls"):
             self._check_plain_login(spec)
         server = SmtpServer(
@@ -239,6 +246,16 @@ class _Maker:
             ca_file=self._ca_file(spec.ca_file),
         )
         return WebhookTransport(address)
+
+    def _apprise(self, spec: AppriseSpec, name: str) -> Transport:
+        key, url = self._name("url_file"), self._secret("url", spec.url_file, spec.url_env)
+        try:
+            return AppriseTransport(url, name, spec.timeout, with_picture=spec.picture)
+        except NoService:
+            problem = "holds no address that Apprise knows: see https://github.com/caronc/apprise for each service's"
+            raise ParamError(key, problem) from None
+        except ImportError as err:
+            raise ParamError(key, f"needs Apprise, which is not installed ({err}): run scripts/bootstrap") from err
 
     def _secret(self, what: str, file: str, variable: str) -> str:
         return read_secret(self._name(f"{what}_file"), file, variable, self._around.environ)

@@ -1,7 +1,8 @@
 """The mail of a notice: proper MIME, and nothing that a parameter or a room's name can inject.
 
-Differs from the tutorial: Date, Message-ID, character set, room, time, verdict and the picture (the original writes
-three header lines and one sentence).
+Differs from the tutorial: subject and first line say what was seen and where (`mail_style: tutorial` gives the
+original's); Date, Message-ID, character set, room, time, verdict and the picture (the original writes three header
+lines and one sentence).
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.safe_text import one_line, token
 from rosbot_patrol.errors import ParamError
 
+SUBJECT = "rosbot patrol node"  # the tutorial's own
+FIRST_SENTENCE = "I have found something strange it could be invader"
+
 _POLICY = SMTP.clone(cte_type="7bit")  # for servers that do not know 8BITMIME
 _USER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]*")  # a user of this machine
 _HOST = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*")
@@ -32,11 +36,13 @@ class Envelope:
         sender: of the mail.
         to: all recipients, for the mail's header; nobody twice.
         only: recipient of this copy; None if there is only one recipient.
+        is_tutorial: mails about incidents begin with the tutorial's subject and sentence.
     """
 
     sender: Address
     to: tuple[Address, ...]
     only: Address | None = None
+    is_tutorial: bool = False
 
     def copies(self) -> list[Envelope]:
         """One envelope for each recipient, so that a refusal or delay by one concerns no other."""
@@ -121,6 +127,8 @@ def build_mail(notice: Notice, envelope: Envelope) -> EmailMessage:
         notice: the content; nothing in it can add a header or a line to the table of facts.
         envelope: sender and recipients.
     """
+    if envelope.is_tutorial and notice.kind == "incident":
+        notice = replace(notice, subject=SUBJECT, text=f"{FIRST_SENTENCE}.\n\n{notice.text}")
     mail = _empty_mail(one_line(notice.subject)[:200], notice.id, notice.wall, envelope)
     mail["X-Rosbot-Patrol-Kind"] = token(notice.kind)
     if notice.incident:

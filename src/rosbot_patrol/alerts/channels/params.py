@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rosbot_patrol.alerts.channels.webhook import check_url
+from rosbot_patrol.alerts.channels.transports.webhook import check_url
 from rosbot_patrol.params import param
 
 KINDS = ("incident", "verdict", "sensor", "fault", "test")
 PASSWORD_VARIABLE = "ROSBOT_PATROL_SMTP_PASSWORD"
+MAIL_STYLES = ("plain", "tutorial")
 _SECURITY = ("auto", "none", "starttls", "tls")
 
 
@@ -26,6 +27,9 @@ class MailParams:
     )
     maildir: str = param("", doc="Maildir for mails on this disk; empty: rosbot_patrol/mail in ROS's home")
     sendmail: str = param("", doc="path of the sendmail program; empty: the usual places")
+    mail_style: str = param(
+        "plain", choices=MAIL_STYLES, doc="plain: subject says what and where; tutorial: its own subject and sentence"
+    )
     mail_interval: float = param(10.0, unit="s", lo=0.0, doc="minimum time between two mails; delays mails, drops none")
     mail_timeout: float = param(
         30.0, unit="s", lo=0.5, hi=600.0, doc="longest wait for an answer of a mail server or program"
@@ -54,7 +58,7 @@ class MailParams:
 class ChannelSpec:
     """Keys that every channel of the file has."""
 
-    type: str = param(choices=("sendmail", "smtp", "maildir", "webhook"), doc="type of the channel")
+    type: str = param(choices=("sendmail", "smtp", "maildir", "webhook", "apprise"), doc="type of the channel")
     kinds: list[str] = param([], choices=KINDS, doc="kinds of notices it sends; empty: all")
     interval: float = param(
         10.0, unit="s", lo=0.0, doc="minimum time between two messages; delays messages, drops none"
@@ -70,6 +74,7 @@ class MaildirSpec(ChannelSpec):
     folder: str = param("", doc="folder of the Maildir; empty: rosbot_patrol/mail in ROS's home")
     to: str = param("", doc="recipients in the mail headers")
     sender: str = param("", name="from", doc="sender in the mail headers")
+    style: str = param("plain", choices=MAIL_STYLES, doc="plain: subject says what and where; tutorial: its own")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +83,7 @@ class SendmailSpec(ChannelSpec):
 
     to: str = param(doc="recipients, separated by commas")
     sender: str = param("", name="from", doc="sender")
+    style: str = param("plain", choices=MAIL_STYLES, doc="plain: subject says what and where; tutorial: its own")
     program: str = param("", doc="path of the program; empty: the usual places")
 
 
@@ -87,6 +93,7 @@ class SmtpSpec(ChannelSpec):
 
     to: str = param(doc="recipients, separated by commas")
     sender: str = param("", name="from", doc="sender")
+    style: str = param("plain", choices=MAIL_STYLES, doc="plain: subject says what and where; tutorial: its own")
     host: str = param("localhost", doc="mail server")
     port: int = param(25, lo=1, hi=65535, doc="port of the mail server")
     security: str = param("auto", choices=_SECURITY, doc="encryption; auto: STARTTLS if the server offers it")
@@ -111,7 +118,17 @@ class WebhookSpec(ChannelSpec):
     allow_plaintext: bool = param(False, doc="allow sending the token over plain http to another machine")
 
 
+@dataclass(frozen=True, kw_only=True)
+class AppriseSpec(ChannelSpec):
+    """A service that Apprise knows, such as ntfy, Pushover, Telegram, Signal, Matrix or Slack."""
+
+    url_file: str = param("", doc="file with the service's Apprise address, of mode 600")
+    url_env: str = param("", doc="environment variable with the service's Apprise address")
+    picture: bool = param(True, doc="send the picture, if the service takes one")
+
+
 SPECS: Mapping[str, type[ChannelSpec]] = {
+    "apprise": AppriseSpec,
     "maildir": MaildirSpec,
     "sendmail": SendmailSpec,
     "smtp": SmtpSpec,

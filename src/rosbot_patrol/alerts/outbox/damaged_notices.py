@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from rosbot_patrol.alerts.outbox.incident_notices import SUBJECT, incident_notice, verdict_notice
+from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.records.incident import Incident
 from rosbot_patrol.alerts.records.store import IncidentStore
@@ -60,7 +60,7 @@ def _lost(notice_id: str, wall: float) -> Notice:
         id=notice_id,
         wall=wall,
         kind="incident" if is_incident else "fault",
-        subject=SUBJECT if is_incident else "rosbot patrol: a notice was damaged",
+        subject="Somebody was seen" if is_incident else "rosbot patrol: a notice was damaged",
         text=f"{what} was damaged on the robot's disk before it could leave. Nothing more is known of it.\n\n"
         "Look at what `rosrun rosbot_patrol incidents list` shows of that time.",
         incident=notice_id if is_incident else "",

@@ -1,4 +1,4 @@
-"""What a notice about an incident says. Matches the tutorial's subject and first sentence."""
+"""What a notice about an incident says: what and where first, as a phone's lock screen shows no more."""
 
 from __future__ import annotations
 
@@ -9,9 +9,6 @@ from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.records.incident import Incident, Place
 from rosbot_patrol.alerts.safe_text import one_line, token
 from rosbot_patrol.counts import count_of
-
-SUBJECT = "rosbot patrol node"
-FIRST_SENTENCE = "I have found something strange it could be invader"
 
 
 def incident_notice(incident: Incident, picture: bytes | None, *, picture_note: str = "") -> Notice:
@@ -26,7 +23,7 @@ def incident_notice(incident: Incident, picture: bytes | None, *, picture_note: 
         id=token(incident.id),
         wall=_moment(incident),
         kind="incident",
-        subject=SUBJECT,
+        subject=title(incident),
         text=_text(incident),
         facts=_facts(incident, picture_note),
         **_rooms(incident),
@@ -56,12 +53,26 @@ def _picture_place(incident: Incident) -> str:
     return f"room{incident.person_room_id}" if is_numbered else "person"
 
 
+def title(incident: Incident) -> str:
+    """One line, such as "Person in corridor hall, 06:00"."""
+    names = {Place.CALLED: incident.room_name, Place.OTHER: incident.person_room}
+    name = names.get(incident.place) or incident.where
+    when = time.strftime("%H:%M", time.localtime(_moment(incident)))
+    return _sentence(f"{incident.object_class} {_in(incident)}{name}, {when}")
+
+
 def _text(incident: Incident) -> str:
-    if incident.place is Place.CALLED:
-        return f"{FIRST_SENTENCE}."
-    inside = "in " if incident.place is Place.OTHER else ""
-    where = f"{one_line(incident.object_class)} seen {inside}{one_line(incident.where)}"
-    return f"{FIRST_SENTENCE}.\n\n{where[:1].upper()}{where[1:]}.\nCalled by {one_line(incident.call)}."
+    seen = _sentence(f"{incident.object_class} seen {_in(incident)}{incident.where}.")
+    return seen if incident.place is Place.CALLED else f"{seen}\nCalled by {one_line(incident.call)}."
+
+
+def _in(incident: Incident) -> str:
+    return "in " if incident.place in (Place.CALLED, Place.OTHER) else ""
+
+
+def _sentence(text: str) -> str:
+    line = one_line(text).lstrip(" .")
+    return f"{line[:1].upper()}{line[1:]}"
 
 
 def verdict_notice(incident: Incident) -> Notice:

@@ -6,8 +6,8 @@ from rosbot_patrol.alerts.channels.channel import Channel
 from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.mail import make_envelope, parse_addresses
 from rosbot_patrol.alerts.channels.params import MailParams
-from rosbot_patrol.alerts.channels.smtp import SmtpServer as Server
-from rosbot_patrol.alerts.channels.smtp import SmtpTransport
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpServer as Server
+from rosbot_patrol.alerts.channels.transports.smtp import SmtpTransport
 from rosbot_patrol.errors import ParamError
 
 A, B, C = "a@example.org", "b@example.org", "c@example.org"

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from rosbot_patrol.alerts.channels import sendmail
 from rosbot_patrol.alerts.channels.config import Surroundings, load_channels, make_channels
 from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.channels.secrets_on_disk import read_secret, refuse_secrets
+from rosbot_patrol.alerts.channels.transports import sendmail
 from rosbot_patrol.alerts.dispatch.settings_file import Settings, differences, read_settings, write_settings
 from rosbot_patrol.errors import ParamError
 
@@ -114,7 +114,7 @@ WEB = {"type": "webhook", "url": "https://x.org/"}
         ("channels: {a: {type: maildir}, a: {type: maildir}}", "is no valid yaml at line 1"),
         ({"a b": WEB}, "channels/a b: expected a name of letters"),
         ({"a": 3}, "channels/a/: expected a group of keys, got 3"),
-        ({"a": {}}, "channels/a/type: is missing, expected one of maildir, sendmail, smtp, webhook"),
+        ({"a": {}}, "channels/a/type: is missing, expected one of apprise, maildir, sendmail, smtp, webhook"),
         ({"a": {"type": "pigeon"}}, "channels/a/type: is 'pigeon', expected one of"),
         ({"a": {"type": "webhook"}}, "channels/a/url: is missing"),
         ({"a": {**WEB, "kind": ["incident"]}}, "channels/a/kind: 'kind' is not known here, did you mean 'kinds'"),
@@ -165,12 +165,12 @@ def test_the_file_that_is_shipped_is_one(tmp_path, monkeypatch):
     text = (ROOT / "config" / "channels.yaml").read_text(encoding="utf-8")
     lines = [line[2:] if line.startswith("# ") and line[2:3] in " c" else line for line in text.splitlines()]
     shown = "\n".join(line for line in lines if not line.startswith("#"))
-    for name in ("smtp_password", "webhook_secret"):
-        (tmp_path / name).write_text("x")
+    for name in ("smtp_password", "webhook_secret", "push_url"):
+        (tmp_path / name).write_text("ntfys://ntfy.example.org/topic" if name == "push_url" else "x")
         (tmp_path / name).chmod(0o600)
     path = file(tmp_path, shown.replace("~/.config/rosbot_patrol", str(tmp_path)))
     made = load_channels(path, around(tmp_path))
-    assert {c.transport.name for c in made} == {"smtp", "webhook", "maildir"}
+    assert {c.transport.name for c in made} == {"smtp", "webhook", "apprise", "maildir"}
 
 
 def test_programs_that_were_told_different_things_are_named(tmp_path):

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from email import message_from_bytes
 from email.policy import SMTP, default
 
@@ -14,9 +15,18 @@ def read_back(mail):
     return message_from_bytes(mail.as_bytes(policy=SMTP), policy=default)
 
 
-def test_the_mail_is_the_tutorials_and_a_proper_one(make_incident, envelope):
-    mail = read_back(build_mail(incident_notice(make_incident(), JPEG), envelope))
+def test_a_mail_in_the_tutorials_style(make_incident, envelope):
+    notice = incident_notice(make_incident(), JPEG)
+    mail = read_back(build_mail(notice, replace(envelope, is_tutorial=True)))
     assert mail["Subject"] == "rosbot patrol node"
+    lines = mail.get_body(("plain",)).get_content().splitlines()
+    assert lines[0] == "I have found something strange it could be invader."
+    assert lines[2].startswith("Person seen in ")
+
+
+def test_the_mail_says_what_and_where_and_is_a_proper_one(make_incident, envelope):
+    mail = read_back(build_mail(incident_notice(make_incident(), JPEG), envelope))
+    assert mail["Subject"].startswith("Person in Küche – 台所, ")
     assert mail["To"] == "owner@example.org"
     assert mail["From"] == "robot@example.org"
     assert mail["Message-ID"] == "<20261121T010203Z-1@example.org>"
@@ -25,7 +35,7 @@ def test_the_mail_is_the_tutorials_and_a_proper_one(make_incident, envelope):
     body = mail.get_body(("plain",))
     assert body.get_content_charset() == "utf-8"
     text = body.get_content()
-    assert text.startswith("I have found something strange it could be invader")
+    assert text.startswith("Person seen in room 3 (Küche – 台所).")
     assert "3 (Küche – 台所)" in text
     assert "confirmed" in text
     assert "person, probability 0.87" in text
@@ -54,7 +64,7 @@ def test_without_a_picture_the_mail_says_why(make_incident, envelope):
 def test_no_field_can_inject_a_header_or_a_line(make_incident, envelope, field, evil):
     mail = read_back(build_mail(incident_notice(make_incident(**{field: evil}), JPEG), envelope))
     assert mail["Bcc"] is None
-    assert mail["Subject"] == "rosbot patrol node"
+    assert mail["Subject"].isprintable()
     assert sorted(mail.keys()) == sorted(read_back(build_mail(incident_notice(make_incident(), JPEG), envelope)).keys())
     lines = mail.get_body(("plain",)).get_content().splitlines()
     assert not any(line.startswith(("Bcc", "new body", ".")) for line in lines)

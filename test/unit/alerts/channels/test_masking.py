@@ -7,7 +7,7 @@ import pytest
 from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.masking import Mask, masked_url, url_secrets
 from rosbot_patrol.alerts.channels.params import MailParams
-from rosbot_patrol.alerts.channels.webhook import check_url
+from rosbot_patrol.alerts.channels.transports.webhook import check_url
 from rosbot_patrol.errors import ParamError
 
 SECRET, KEY = "Xk29-topSecret_hook", "q7%2BKEYvalue"

@@ -5,7 +5,7 @@ import pytest
 from post import Box, Time, channel, deliver_all, dispatcher, notice
 
 from rosbot_patrol.alerts.channels.mail import make_envelope
-from rosbot_patrol.alerts.channels.maildir import MaildirTransport
+from rosbot_patrol.alerts.channels.transports.maildir import MaildirTransport
 from rosbot_patrol.alerts.dispatch.status_file import NAME
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 

@@ -8,7 +8,7 @@ import pytest
 from post import Box, Time, channel, deliver_all, dispatcher, notice, send_all, settle, spare
 
 from rosbot_patrol.alerts.channels.mail import make_envelope
-from rosbot_patrol.alerts.channels.maildir import MaildirTransport
+from rosbot_patrol.alerts.channels.transports.maildir import MaildirTransport
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.alerts.outbox.receipts import Receipts
 

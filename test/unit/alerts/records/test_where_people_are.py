@@ -7,7 +7,7 @@ import pytest
 
 from rosbot_patrol.alerts.channels.mail import build_mail
 from rosbot_patrol.alerts.channels.mail_html import html_page
-from rosbot_patrol.alerts.channels.webhook import document
+from rosbot_patrol.alerts.channels.transports.webhook import document
 from rosbot_patrol.alerts.outbox.digest import merge
 from rosbot_patrol.alerts.outbox.incident_notices import incident_notice
 from rosbot_patrol.alerts.outbox.notice import Notice
@@ -39,7 +39,8 @@ def test_somebody_in_another_room(elsewhere):
     notice = incident_notice(elsewhere, b"\xff\xd8")
     assert notice.facts[:2] == (("Room", "5 (kitchen)"), ("Caller", "a motion sensor in room 7 (study)"))
     assert notice.picture_name == "room5-20261121T010203Z-1.jpg"
-    assert notice.text.splitlines()[2:] == [
+    assert notice.subject.startswith("Person in kitchen, ")
+    assert notice.text.splitlines() == [
         "Person seen in room 5 (kitchen).",
         "Called by a motion sensor in room 7 (study).",
     ]
@@ -61,7 +62,7 @@ def test_somebody_in_another_room(elsewhere):
 @pytest.mark.parametrize("phase", ["looking", ""])
 def test_in_the_room_of_the_call_nothing_is_told_otherwise(make_incident, known, phase):
     notice = incident_notice(make_incident(**STUDY, **known, phase=phase), None)
-    assert notice.text == "I have found something strange it could be invader."
+    assert notice.text == "Person seen in room 7 (study)."
     assert (notice.room_id, notice.room_name, notice.place, notice.called_id) == (7, "study", "", -1)
     assert notice.facts[0] == ("Room", "7 (study)")
     assert "Caller" not in dict(notice.facts)
@@ -77,6 +78,7 @@ def test_on_the_way_without_a_place_no_room_is_claimed(make_incident, phase, way
     assert notice.picture_name == "person-20261121T010203Z-1.jpg"
     assert f"<title>{way} room 7 (study)</title>" in html_page(notice)
     assert json.loads(document(notice))["place"] == f"{way} room 7 (study)"
+    assert notice.subject.startswith(f"Person {way} room 7 (study), ")
     assert heading(page(incident)) == f"{way[0].upper()}{way[1:]} room 7 (study)"
 
 
@@ -86,6 +88,7 @@ def test_in_no_room_of_the_map_no_room_is_claimed(make_incident, phase):
     notice = incident_notice(incident, b"\xff\xd8")
     assert notice.facts[0] == ("Room", "in no room of the map, near room 7 (study)")
     assert "person seen in no room of the map" in incident.sentence
+    assert notice.subject.startswith("Person in no room of the map, near room 7 (study), ")
     assert notice.picture_name == "person-20261121T010203Z-1.jpg"
     assert heading(page(incident)).startswith("In no room of the map")
 
@@ -116,7 +119,7 @@ def test_the_other_rooms_name_can_inject_nothing(make_incident, envelope, evil):
     notice = incident_notice(incident, b"\xff\xd8")
     mail = build_mail(notice, envelope).as_bytes(policy=SMTP).decode()
     assert not any(line.startswith(("Bcc", "new body")) for line in mail.splitlines())
-    assert "\n" not in notice.text.splitlines()[2]
+    assert len(notice.text.splitlines()) == 2
     assert "<b>" not in page(incident)
     assert "<b>" not in html_page(notice)
 
