@@ -23,6 +23,7 @@
     |- ImageError         invalid bytes of a picture
     |- SensorError        a sensor's message that cannot be used
     |- AlertError         a notice that could not be delivered
+    |- AccessError        a person, password or order that the console does not take
     `- StoreError         incidents that could not be kept or read
 
 A constructor takes facts and writes the sentence, so that every message says what happened and where.
@@ -112,6 +113,15 @@ class ResultError(_FileError):
 
 class StateError(_FileError):
     """A file written by one of our programs that cannot be used now: which file, and why."""
+
+
+class AccessError(PatrolError):
+    """A person, password or order that the console does not take: what, and why."""
+
+    def __init__(self, what: str, problem: str) -> None:
+        super().__init__(f"{what} {problem}")
+        self.what = what
+        self.problem = problem
 
 
 class PlanningError(PatrolError):

@@ -151,6 +151,8 @@ class House:
                 "state_dir": str(folder / "state"),
             }
         )
+        if not launch and not plain:
+            given["console"] = "false"  # nobody looks
         given.update(arguments)
         options = [f"{k}:={v}" for k, v in given.items()]
         self._command = [*before, "roslaunch", "--skip-log-check", *command, *options]

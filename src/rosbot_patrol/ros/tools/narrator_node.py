@@ -61,6 +61,7 @@ class NarratorNode:
         self._began = time.monotonic()
         self._ended_at: float | None = None
         self._hinted = False
+        self._page_at: float | None = self._began  # when to look for the console's address again
         file = self.params.scenario
         self._scenario = ScenarioWatch(file, self.params.simulator, self._tell) if file else None
         self._subscribers = [
@@ -80,12 +81,22 @@ class NarratorNode:
             self._scenario.start()
         while not rospy.is_shutdown():
             time.sleep(0.1)
+            self._look_for_page()
             status = self._status()
             if status is not None:
                 self._finish(status)
                 return status
         self._write_summary()
         return 0
+
+    def _look_for_page(self) -> None:
+        """Tell where the owner's page is, once the console runs."""
+        if self._page_at is None or time.monotonic() < self._page_at:
+            return
+        url = rospy.get_param("console/url", "")
+        self._page_at = None if url else time.monotonic() + 1.0
+        if url:
+            self._tell(f"the guard's page: {url}")
 
     def _clock(self) -> float:
         return round(time.monotonic() - self._began, 2)

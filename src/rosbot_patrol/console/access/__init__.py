@@ -1,0 +1,1 @@
+"""Who may use the console: people, passwords, sessions, and the record of their orders."""

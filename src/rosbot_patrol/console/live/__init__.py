@@ -1,0 +1,1 @@
+"""What the pages show now, and the orders that they give."""

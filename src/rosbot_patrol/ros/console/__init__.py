@@ -1,0 +1,1 @@
+"""The console's node: topics into its pages, and its orders out."""
