@@ -1,0 +1,1 @@
+"""The guard in a smart home: MQTT with Home Assistant's discovery."""
