@@ -11,6 +11,8 @@ from rosbot_patrol.alerts.channels.params import SPECS, MailParams
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
 from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.amcl.parameters import AmclParams
+from rosbot_patrol.console.home_assistant.settings import BrokerSpec
+from rosbot_patrol.console.web.server import ServerParams
 from rosbot_patrol.control.teleop import TeleopParams
 from rosbot_patrol.costmap.params import (
     CostmapParams,
@@ -41,6 +43,8 @@ from rosbot_patrol.planning.global_planners.navfn import NavfnParams
 from rosbot_patrol.planning.local_planners.dwa_params import DWAPlannerParams
 from rosbot_patrol.planning.local_planners.trajectory_params import TrajectoryPlannerParams
 from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
+from rosbot_patrol.ros.console.home_assistant_node import HomeAssistantParams
+from rosbot_patrol.ros.console.node import ConsoleParams
 from rosbot_patrol.ros.detector.republish_node import RepublishParams
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
 from rosbot_patrol.ros.drivers.astra_depth_node import AstraDepthParams
@@ -131,6 +135,8 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ("ekf_localization_node", [("", EkfParams), ("<odom0, pose0, twist0, imu0, odom1, ...>_", InputParams)]),
     ("teleop_twist_keyboard.py", [("", TeleopParams)]),
     ("simulator", [("", SimulatorParams)]),
+    ("console", [("", ConsoleParams), ("", ServerParams)]),
+    ("home_assistant", [("", HomeAssistantParams)]),
     ("narrator", [("", NarratorParams)]),
     ("demo_intruder", [("", DemoParams)]),
 ]
@@ -181,6 +187,7 @@ def document() -> str:
     lines += ["", "## file of the channels"]
     for kind, spec in sorted(SPECS.items()):
         lines += ["", f"`channels/NAME/` with `type: {kind}`", "", table(spec)]
+    lines += ["", "## file of the MQTT broker", "", table(BrokerSpec)]
     lines += ["", "## scenario file"]
     for place, cls in SCENARIO:
         lines += ["", *([f"`{place}`", ""] if place else []), table(cls)]
