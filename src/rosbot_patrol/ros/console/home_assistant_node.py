@@ -41,6 +41,7 @@ log = logging.getLogger(__name__)
 
 _PERIOD = 0.05  # [s] between two looks for news
 _HEALTH = 1.0  # [s]
+_RECORD = 20.0  # [s] after a verdict its record is complete
 _WHO = Account(name="MQTT", role=Role.MEMBER)
 
 
@@ -76,14 +77,19 @@ class HomeAssistantNode:
     def run(self) -> None:
         """Tell until shutdown."""
         self._link.start()
-        version, health_at = -1, 0.0
+        self._tell_incident()  # what is on record before the start is no news
+        version, incidents, until, health_at = -1, 0, 0.0, 0.0
         while not rospy.is_shutdown():
             time.sleep(_PERIOD)
             if self._hub.version != version:
                 version = self._hub.version
                 self._tell()
+            if self._hub.state.incidents != incidents:
+                incidents, until = self._hub.state.incidents, time.monotonic() + _RECORD
             if time.monotonic() - health_at > _HEALTH:
                 health_at = time.monotonic()
+                if health_at < until:
+                    self._tell_incident()
                 problem = self._link.problem
                 level, text = (WARN, problem) if problem else (OK, f"connected with {self._broker.where}")
                 self._health.set("MQTT broker", level, text)
@@ -98,15 +104,15 @@ class HomeAssistantNode:
         self._link.tell(found)
         self._link.tell(states(state, self._link.topics))
         self._link.set_online(is_online=status_of(state))
-        self._tell_incident()
 
     def _tell_incident(self) -> None:
-        """Tell the newest incident that has its verdict, and its picture."""
+        """Tell the newest incident with a complete record, and its picture."""
         try:
             cards = self._incidents.find(Query(limit=3))
-            card = next((each for each in cards if each.found.verdict in EVENTS), None)
+            complete = (each for each in cards if each.found.closed is not None)
+            card = next((each for each in complete if each.found.verdict in EVENTS), None)
+            is_first, self._is_first = self._is_first, False
             if card is None or card.found.id == self._newest:
-                self._is_first = False
                 return
             found, self._newest = card.found, card.found.id
             if card.picture and (data := self._incidents.file(found.id, card.picture)):
@@ -115,9 +121,8 @@ class HomeAssistantNode:
             log.warning("the last incident cannot be told: %s", err)
             return
         event = {"event_type": found.verdict, "room": found.room_name, "reason": found.reason, "id": found.id}
-        if not self._is_first:  # what was on record before the start is no news
+        if not is_first:
             self._link.tell_once(self._link.topics.state("incident"), event)
-        self._is_first = False
 
     def _on_order(self, topic: str, payload: bytes) -> None:
         try:
