@@ -133,9 +133,12 @@ class Browser:
 
     def die(self):
         """End the browser as a phone without power does."""
-        children = Path(f"/proc/{self.driver.service.process.pid}/task/{self.driver.service.process.pid}/children")
-        for pid in children.read_text().split():
-            os.kill(int(pid), signal.SIGKILL)
+        driver = str(self.driver.service.process.pid)
+        parents = {path: path.read_text().rpartition(")")[2].split()[1] for path in Path("/proc").glob("[0-9]*/stat")}
+        children = [int(path.parent.name) for path, parent in parents.items() if parent == driver]
+        assert children
+        for pid in children:
+            os.kill(pid, signal.SIGKILL)
 
     def close(self):
         self.driver.quit()

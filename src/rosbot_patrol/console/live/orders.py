@@ -136,7 +136,7 @@ class Desk:
             answer = Answer(accepted=False, text=later("Guests give no orders."))
         else:
             answer = await _carried_out(order)
-        self._write(visitor, what, answer)
+        await asyncio.to_thread(self._write, visitor, what, answer)  # a slow disk holds up no page
         return answer
 
     def _write(self, visitor: Visitor, what: str, answer: Answer) -> None:

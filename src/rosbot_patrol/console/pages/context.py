@@ -24,7 +24,6 @@ class Context:
         incidents: what is on record.
         know: adds an object that looks like somebody to the file of the known ones; raises ParamError, OSError.
         state_dir: of the guard.
-        wall: seconds since 1970.
     """
 
     hub: Hub
@@ -33,4 +32,3 @@ class Context:
     incidents: IncidentDesk
     know: Callable[[KnownObject], None]
     state_dir: Path
-    wall: Callable[[], float]

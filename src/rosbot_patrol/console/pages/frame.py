@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 
+from babel.dates import format_datetime
 from nicegui import ui
 from starlette.requests import Request
 
@@ -26,16 +28,25 @@ class View:
 
     Attributes:
         visitor: who.
-        words: of their language.
+        language: "en" or "de".
     """
 
     visitor: Visitor
-    words: Words
+    language: str
 
     @property
     def account(self) -> Account:
         """Who it is."""
         return self.visitor.account
+
+    @property
+    def words(self) -> Words:
+        """Texts in their language."""
+        return words_of(self.language)
+
+    def time(self, wall: float, pattern: str) -> str:
+        """A time in the robot's time zone, in their language; the pattern is that of Unicode (CLDR)."""
+        return str(format_datetime(datetime.fromtimestamp(wall), pattern, locale=self.language))
 
 
 def _pages(_: Words) -> tuple[tuple[str, str, str], ...]:
@@ -60,7 +71,7 @@ def frame(context: Context, request: Request, path: str) -> Iterator[View]:
     account: Account = request.state.account
     language = account.language or language_of(request.headers.get("accept-language", ""))
     _ = words_of(language)
-    view = View(visitor=Visitor(account=account, peer=peer_of(request.scope)), words=_)
+    view = View(visitor=Visitor(account=account, peer=peer_of(request.scope)), language=language)
     ui.add_head_html(
         '<link rel="manifest" href="/manifest.webmanifest"><link rel="stylesheet" href="/style.css">'
         '<meta name="theme-color" content="#1565c0">'

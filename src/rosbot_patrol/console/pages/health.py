@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import shutil
-import time
 
 from nicegui import ui
 from starlette.requests import Request
@@ -149,6 +148,5 @@ def _last_orders(context: Context, view: View) -> None:
                 with ui.element("li"):
                     icon = "check" if order.accepted else "block"
                     ui.icon(icon, size="20px").props('aria-hidden="true"')
-                    when = time.strftime("%d.%m. %H:%M", time.localtime(order.wall))
-                    ui.label(when).classes("opacity-80 text-sm")
+                    ui.label(view.time(order.wall, "d MMM, HH:mm")).classes("opacity-80 text-sm")
                     ui.label(f"{order.who}: {order.what}. {order.answer}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable
 from urllib.parse import quote
 
@@ -59,7 +58,7 @@ class _Page:
         with ui.row().classes("items-center gap-2"):
             ui.label(title_of(incident, _)).classes("text-2xl").props('role="heading" aria-level="1"')
             ui.badge(verdict_name(incident.verdict, _), color=verdict_colour(incident.verdict)).classes("text-base")
-        when = time.strftime("%A %d %B %Y, %H:%M:%S", time.localtime(incident.wall))
+        when = self._view.time(incident.wall, "EEEE d MMMM y, HH:mm:ss")
         ui.label(f"{when} · {origin_text(incident.origin, _)}").classes("opacity-80")
         ui.label(incident.reason or incident.sentence)
         with ui.element("div").classes("console-columns"):
@@ -183,11 +182,11 @@ class _Page:
             ui.label(_("What happened")).classes("text-lg").props('role="heading" aria-level="2"')
             with ui.element("ol").classes("console-timeline"):
                 for event in (*self._incident.events, *self._details.amendments):
-                    _draw_event(event)
+                    _draw_event(event, self._view)
 
 
-def _draw_event(event: Event) -> None:
+def _draw_event(event: Event, view: View) -> None:
     with ui.element("li"):
         ui.icon(_KINDS.get(event.kind, "notes"), size="20px").props('aria-hidden="true"')
-        ui.label(time.strftime("%H:%M:%S", time.localtime(event.wall))).classes("opacity-80 text-sm")
+        ui.label(view.time(event.wall, "HH:mm:ss")).classes("opacity-80 text-sm")
         ui.label(event.text)

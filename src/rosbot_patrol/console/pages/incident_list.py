@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Awaitable, Callable
 from datetime import datetime, timedelta
 from urllib.parse import quote
@@ -102,7 +101,7 @@ def _draw_card(card: Card, view: View) -> None:
                 ui.icon("image_not_supported", size="32px").props('aria-hidden="true"')
         with ui.column().classes("gap-1 p-3"):
             ui.label(title_of(found, _)).classes("font-medium")
-            ui.label(time.strftime("%a %d %b %Y, %H:%M", time.localtime(found.wall))).classes("text-sm opacity-80")
+            ui.label(view.time(found.wall, "EEE d MMM y, HH:mm")).classes("text-sm opacity-80")
             with ui.row().classes("gap-1"):
                 ui.badge(verdict_name(found.verdict, _), color=verdict_colour(found.verdict))
                 if FALSE_ALARM in card.marks:

@@ -55,10 +55,11 @@ class Feed:
         self._alive = self._boxes_at = float("-inf")
         self._maps: Latest[OccupancyGrid] = Latest()
         self._transforms: Transforms | None = None
+        self._viewers: dict[str, int] = {}
         self._optional: dict[str, list[rospy.Subscriber]] = {}
         self._load_rooms()
         self._subscribe()
-        hub.on_viewers = self._on_viewers
+        hub.on_viewers = self._viewers.__setitem__  # the pages' thread does not wait for the master
         Worker(self._run, name="feed").start()
 
     def _load_rooms(self) -> None:
@@ -112,12 +113,12 @@ class Feed:
 
     # -- while somebody looks
 
-    def _on_viewers(self, subject: str, count: int) -> None:
-        with self._lock:
-            is_on = subject in self._optional
-            if count and not is_on:
-                self._optional[subject] = {CAMERA: self._watch_camera, MAP: self._watch_map}[subject]()
-            elif not count and is_on:
+    def _follow_viewers(self) -> None:
+        for subject, watch in ((CAMERA, self._watch_camera), (MAP, self._watch_map)):
+            is_on, is_wanted = subject in self._optional, self._viewers.get(subject, 0) > 0
+            if is_wanted and not is_on:
+                self._optional[subject] = watch()
+            elif is_on and not is_wanted:
                 for subscriber in self._optional.pop(subject):
                     subscriber.unregister()
 
@@ -163,6 +164,7 @@ class Feed:
         number, wait = 0, _MAP_RETRY
         while not rospy.is_shutdown():
             time.sleep(_TICK)
+            self._follow_viewers()
             at = time.monotonic()
             if at - self._alive > _ALIVE_FOR:
                 self._hub.change(is_heard=False)

@@ -75,7 +75,6 @@ class ConsoleNode:
             incidents=IncidentDesk(folder, time.time),
             know=lambda thing: add_known(folder / FOUND_FALSE, thing),
             state_dir=folder,
-            wall=time.time,
         )
         Feed(hub, params.path_to_params)
         self._app = make_app(context, is_secure=bool(server.certificate))
