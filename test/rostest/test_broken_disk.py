@@ -210,5 +210,5 @@ def test_a_damaged_notice_is_made_again_of_its_record(house, phone):
     wait_until(lambda: list((house.folder / "file" / "mail" / "new").glob("*")), 20, "the mail")
     (mail,) = (house.folder / "file" / "mail" / "new").glob("*")
     text = mail.read_text()
-    assert "Person seen in " in text
+    assert "Person seen " in text
     assert "image/jpeg" in text

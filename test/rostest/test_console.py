@@ -131,7 +131,13 @@ def test_driving_and_the_emergency_stop(house, console):
 PAGES = ("/", "/incidents", "/drive", "/health", "/settings")
 
 
-@pytest.mark.parametrize(("size", "dark"), [(PHONE, True), (DESK, False)], ids=["phone, dark", "desk, light"])
+@pytest.mark.parametrize(
+    ("size", "dark"),
+    [
+        pytest.param(PHONE, True, id="phone, dark"),
+        pytest.param(DESK, False, id="desk, light", marks=pytest.mark.long),
+    ],
+)
 def test_everybody_can_use_the_pages(house, console, size, dark):
     """axe finds nothing grave: contrast, names of buttons and fields, order of headings, language."""
     house.start_move_base()

@@ -92,6 +92,7 @@ def nearest(stamps: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.abs(others[None, :] - stamps[:, None]).argmin(axis=1)
 
 
+@pytest.mark.long
 def test_amcl_goes_the_same_way(sim_ros: Ros, tmp_path: Path) -> None:
     parameters(sim_ros, "room_amcl", "amcl", use_map_topic=True)
     node = sim_ros.node("amcl", "__name:=amcl")

@@ -147,6 +147,7 @@ def test_a_bridge_is_killed_and_its_sensors_are_told_as_one(ros, tmp_path):
         sensor.stop()
 
 
+@pytest.mark.long
 def test_patrol_and_watch_tell_of_each_other_when_one_hangs(ros, tmp_path):
     """A hung process cannot say so itself; it is stopped here, and goes on."""
     probe = ros.probe()

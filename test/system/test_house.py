@@ -64,9 +64,9 @@ def test_an_intruder_is_mailed_once_and_an_empty_room_is_not(master: object, fol
         mails = house.mails()
         assert len(mails) == 1
         message, picture = read_mail(mails[0])
-        assert message["Subject"].startswith("Person in ")
+        assert message["Subject"].startswith("Person ")
         body = message.get_body(("plain",)).get_content()
-        assert body.startswith("Person seen in ")
+        assert body.startswith("Person seen ")
         assert "person" in body
         assert picture.shape == (480, 640, 3)
         assert picture.std() > 10.0
