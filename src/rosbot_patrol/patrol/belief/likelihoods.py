@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 _LEAST = 0.02  # smallest q, and 1 less the largest: no single measurement is sure
 _PART = 0.7  # largest q of what a pet or a picture may show, too: short legs; a size without knowing if it is flat
+_FLAT_WITHIN = 4.0  # [m] nearer than this depth cameras see pictures; what they do not see is dark clothes
 _DOGS_LEG, _LEG_SPREAD = 0.5, 0.05  # [m] length of the longest legs of dogs, and its spread
 _NEAR_ERROR = 0.35  # [m] error of a place by the floor up to which it tells the size
 _LOWEST = 16  # [px] height below which a box shows nothing
@@ -118,7 +119,7 @@ class Likelihoods:
         if m is not None and box.label == "person":
             if m.has_legs:
                 q = min(q, max(_PART, _taller_than_a_leg(m)))
-            elif m.is_flat is None and m.source != "lidar":  # what the lidar sees stands out from the wall
+            elif m.is_flat is None and m.away > _FLAT_WITHIN and m.source != "lidar":  # what the lidar sees stands out
                 q = min(q, _PART)
         return math.log(q / (1.0 - q)), False, veto
 

@@ -11,6 +11,7 @@ from belief_pictures import WEST, box_of, calibration, eye_at
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.belief.calibration import CAUTIOUS, Condition
 from rosbot_patrol.patrol.belief.likelihoods import Likelihoods, Veto, possibility
 from rosbot_patrol.patrol.belief.params import BeliefParams
@@ -114,10 +115,14 @@ def test_a_part_that_is_as_tall_as_a_pet_may_be_says_little(cut: str) -> None:
 
 def test_a_size_says_little_where_it_may_be_that_of_a_picture() -> None:
     """A poster across the hall has a person's size, and is too far off for the depth camera to tell that it is flat."""
-    poster, body = (judge().box(box_of(WEST, tall=1.7, is_flat=flat), EYE).size for flat in (None, False))
-    by_lidar = judge().box(box_of(WEST, tall=1.7, is_flat=None, source="lidar"), EYE).size
+    across = Pose2D(-5.5, 0.0, 0.0)
+    poster, body = (judge().box(box_of(across, tall=1.7, is_flat=flat), EYE).size for flat in (None, False))
+    by_lidar = judge().box(box_of(across, tall=1.7, is_flat=None, source="lidar"), EYE).size
+    dark_clothes = judge().box(box_of(WEST, tall=1.7, is_flat=None), EYE).size
     assert poster is not None
     assert 0.0 < poster < 1.0
     assert by_lidar == body
+    assert dark_clothes is not None
+    assert dark_clothes > 3.0
     assert body is not None
     assert body > 3.0
