@@ -45,7 +45,7 @@ class View:
         return words_of(self.language)
 
     def time(self, wall: float, pattern: str) -> str:
-        """A time in the robot's time zone, in their language; the pattern is that of Unicode (CLDR)."""
+        """A time in the robot's time zone, in their language, by a date pattern of Unicode (CLDR)."""
         return str(format_datetime(datetime.fromtimestamp(wall), pattern, locale=self.language))
 
 
