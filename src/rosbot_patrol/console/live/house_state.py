@@ -98,6 +98,11 @@ class HouseState:
     problems: Mapping[str, Problem] = field(default_factory=dict)
     incidents: int = 0
 
+    @property
+    def worst_first(self) -> list[Problem]:
+        """The problems, errors before warnings, each by name."""
+        return sorted(self.problems.values(), key=lambda each: (not each.is_error, each.name))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Box:

@@ -40,7 +40,7 @@ def _problems(context: Context, view: View) -> None:
         box = ui.column().classes("w-full gap-2").mark("problems")
 
     def refresh() -> None:
-        found = sorted(context.hub.state.problems.values(), key=lambda each: (not each.is_error, each.name))
+        found = context.hub.state.worst_first
         box.clear()
         with box:
             if not found:

@@ -113,7 +113,7 @@ def _attention(context: Context, view: View) -> None:
 
     def refresh() -> None:
         state = context.hub.state
-        found = sorted(state.problems.values(), key=lambda each: (not each.is_error, each.name))
+        found = state.worst_first
         box.clear()
         with box:
             for problem in found[:4]:
