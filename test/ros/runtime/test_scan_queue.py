@@ -7,8 +7,8 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, Transform
-from rosbot_patrol.ros.runtime import scan_queue
-from rosbot_patrol.ros.runtime.scan_queue import ScanQueue
+from rosbot_patrol.ros.runtime import scans
+from rosbot_patrol.ros.runtime.scans import ScanQueue
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.scan_feed import ScanFeed
 
@@ -45,9 +45,9 @@ def scan_at(stamp):
 
 @pytest.fixture
 def queued(monkeypatch):
-    monkeypatch.setattr(scan_queue, "POLL_S", 0.0)
-    monkeypatch.setattr(scan_queue, "IDLE_S", 0.0)
-    monkeypatch.setattr(scan_queue, "now", lambda: 0.0)
+    monkeypatch.setattr(scans, "POLL_S", 0.0)
+    monkeypatch.setattr(scans, "IDLE_S", 0.0)
+    monkeypatch.setattr(scans, "now", lambda: 0.0)
 
     def made(tf, stamps):
         feed = ScanFeed(tf, "odom", "base_link", lost="nothing happens")

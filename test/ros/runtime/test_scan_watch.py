@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.ros.runtime import scan_watch
-from rosbot_patrol.ros.runtime.scan_watch import ScanWatch
+from rosbot_patrol.ros.runtime import scans
+from rosbot_patrol.ros.runtime.scans import ScanWatch
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.scan_feed import ScanFeed
 from rosbot_patrol.tf.tree import TransformTree
@@ -23,7 +23,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr(scan_watch, "now", lambda: clock.time)
+    monkeypatch.setattr(scans, "now", lambda: clock.time)
     return clock
 
 

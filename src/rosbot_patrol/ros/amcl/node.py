@@ -50,8 +50,7 @@ from rosbot_patrol.ros.messages.fast_arrays import SetMapFast
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.runtime.node import Loop, load_params, now, run_node
 from rosbot_patrol.ros.runtime.process import Priority
-from rosbot_patrol.ros.runtime.scan_queue import ScanQueue
-from rosbot_patrol.ros.runtime.scan_watch import ScanWatch
+from rosbot_patrol.ros.runtime.scans import ScanQueue, ScanWatch
 from rosbot_patrol.ros.runtime.transforms import Transforms
 from rosbot_patrol.scan_line import PlacedScan
 

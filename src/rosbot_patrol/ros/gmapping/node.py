@@ -39,8 +39,7 @@ from rosbot_patrol.ros.messages.convert import grid_to_msg, scan_from_msg, trans
 from rosbot_patrol.ros.messages.fast_arrays import GetMapFast, GridMsg
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.runtime.node import Loop, load_params, run_node
-from rosbot_patrol.ros.runtime.scan_queue import ScanQueue
-from rosbot_patrol.ros.runtime.scan_watch import ScanWatch
+from rosbot_patrol.ros.runtime.scans import ScanQueue, ScanWatch
 from rosbot_patrol.ros.runtime.transforms import Transforms
 
 log = logging.getLogger(__name__)
