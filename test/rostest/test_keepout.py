@@ -1,4 +1,4 @@
-"""A keep-out mask from a file: plans go round it; without the file the node ends in a sentence."""
+"""A keep-out mask from a file, or zones: plans go round them; without the mask the node ends in a sentence."""
 
 import subprocess
 
@@ -33,9 +33,21 @@ def with_mask(file):
     return costmap | {"plugins": plugins, "keepout_layer": {"mask_file": str(file)}}
 
 
-def test_plans_go_round_a_mask(master, tmp_path):
-    node, _, _ = start_move_base(master, global_costmap=with_mask(mask(tmp_path)))
-    node.says("keep-out mask of 12 x 40 cells", 5.0)
+def zones(folder):
+    """The same strip as a zone that an owner has drawn."""
+    corners = [[1.0, -1.0], [1.6, -1.0], [1.6, 1.0], [1.0, 1.0]]
+    (folder / "zones.yaml").write_text(yaml.dump({"zones": [{"name": "strip", "points": corners}]}))
+    return folder / "zones.yaml"
+
+
+@pytest.mark.parametrize("kind", ["mask", "zones"])
+def test_plans_go_round_it(master, tmp_path, kind):
+    if kind == "mask":
+        node, _, _ = start_move_base(master, global_costmap=with_mask(mask(tmp_path)))
+        node.says("keep-out mask of 12 x 40 cells", 5.0)
+    else:
+        node, _, _ = start_move_base(master, zones_file=str(zones(tmp_path)))
+        node.says("global_costmap: keep-out zones: strip", 5.0)
     told = subprocess.run(
         ["rosservice", "call", "/move_base/make_plan", ASK], env=master.env, capture_output=True, text=True, check=True
     ).stdout

@@ -20,14 +20,18 @@ from rosbot_patrol.costmap.inputs import Input, ScanInput, make_inputs
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.layers.keepout import KeepoutLayer
 from rosbot_patrol.costmap.layers.static import StaticLayer
+from rosbot_patrol.costmap.layers.zones import ZonesLayer
 from rosbot_patrol.costmap.params import CostmapConfig, CostmapParams
-from rosbot_patrol.errors import TransformError
+from rosbot_patrol.errors import ParamError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.maps.zones import read_zones
 from rosbot_patrol.tf.frames import Frames
 
 log = logging.getLogger(__name__)
+
+_ZONES_FRAME = "map"
 
 
 class Fault(enum.Enum):
@@ -51,6 +55,7 @@ class FedCostmap:
         name: "global_costmap" or "local_costmap".
         now: time at the start.
         keeps_last: copy each update to `last`, for costmaps that are read in each control cycle.
+        zones: file of the owner's keep-out zones, which may be missing and may change; None: none.
 
     Raises:
         MapError: the mask file of a keep-out layer cannot be used.
@@ -61,12 +66,20 @@ class FedCostmap:
         last: costs after the last update; nobody changes it.
         fault: reason why the robot must not drive by it, None if it may.
         problem: the same in a sentence, "" if it can.
+        zones_problem: reason why the file of the zones is not used, "" if it is.
         map_problem: reason why a map in another frame could not be placed at the last update, "" if it could.
         updates: number of updates.
     """
 
     def __init__(
-        self, config: CostmapConfig, frames: Frames, name: str, *, now: float = 0.0, keeps_last: bool = False
+        self,
+        config: CostmapConfig,
+        frames: Frames,
+        name: str,
+        *,
+        now: float = 0.0,
+        keeps_last: bool = False,
+        zones: Path | None = None,
     ) -> None:
         self.name = name
         self.params = config.params
@@ -74,8 +87,12 @@ class FedCostmap:
         self.base_frame = config.params.robot_base_frame.lstrip("/")
         self.lock = threading.RLock()
         self.costmap = LayeredCostmap(config)
+        self._zones, self._zones_read = ZonesLayer(), (0, 0)
+        self._zones_file = zones
+        if zones is not None:
+            self.costmap.add(self._zones)
         self.inputs: Sequence[Input[Any]] = make_inputs(self.costmap, now)
-        self.map_problem = ""
+        self.map_problem = self.zones_problem = ""
         self.updates = 0
         self._frames = frames
         self._keeps_last = keeps_last
@@ -93,7 +110,8 @@ class FedCostmap:
     @property
     def map_layers(self) -> list[StaticLayer]:
         """The layers with a map from a topic."""
-        return [layer for layer in self.costmap.static_layers if not _mask_file(layer)]
+        layers = (layer for layer in self.costmap.static_layers if layer is not self._zones)
+        return [layer for layer in layers if not _mask_file(layer)]
 
     def _read_masks(self) -> None:
         for layer in self.costmap.static_layers:
@@ -102,6 +120,28 @@ class FedCostmap:
                 self.hear_map(layer, grid, layer.mask_frame if isinstance(layer, KeepoutLayer) else "")
                 size = grid.cells.shape[::-1]
                 log.info("%s: keep-out mask of %d x %d cells from %s", self.name, *size, _mask_file(layer))
+
+    def _follow_zones(self) -> None:
+        """Read the zones anew if their file has changed; of a bad one the zones before stay."""
+        assert self._zones_file is not None
+        try:
+            state = self._zones_file.stat()
+            read = state.st_mtime_ns, state.st_size
+        except OSError:
+            read = 0, 0
+        if read == self._zones_read:
+            return
+        self._zones_read = read
+        try:
+            zones = read_zones(self._zones_file)
+            self.zones_problem = ""
+        except ParamError as err:
+            self.zones_problem = f"{err}; the zones before stay"
+            log.error("%s: %s", self.name, self.zones_problem)
+            return
+        log.info("%s: keep-out zones: %s", self.name, ", ".join(zone.name for zone in zones) or "none")
+        self._zones.set_zones(zones)
+        self._map_frames[id(self._zones)] = _ZONES_FRAME
 
     # Inputs
 
@@ -160,6 +200,8 @@ class FedCostmap:
         with self.lock:
             for each in self.inputs:
                 each.take(self._frames, self.frame, now)
+            if self._zones_file is not None:
+                self._follow_zones()
             self._place_maps()
             areas = self.costmap.update(now, pose)
             self._keep_last()
@@ -204,7 +246,8 @@ class FedCostmap:
 
     def troubles(self, now: float) -> list[str]:
         """Silent or unusable inputs, a sentence each."""
-        return [f"{self.name}/{text}" for text in (each.trouble(now) for each in self.inputs) if text]
+        texts = (*(each.trouble(now) for each in self.inputs), self.zones_problem)
+        return [f"{self.name}/{text}" for text in texts if text]
 
 
 def _mask_file(layer: StaticLayer) -> str:

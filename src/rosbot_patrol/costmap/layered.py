@@ -79,6 +79,14 @@ class LayeredCostmap:
         self.pose = Pose2D()
         self._resize(_info(p))
 
+    def add(self, layer: Layer) -> None:
+        """Add a layer before the inflation, or as the last one."""
+        at = next((i for i, each in enumerate(self.layers) if isinstance(each, InflationLayer)), len(self.layers))
+        self.layers.insert(at, layer)
+        layer.match(self.info, self.footprint)
+        self._arrange()
+        self._fresh = True
+
     def configure(self, params: CostmapParams) -> None:
         """Use other parameters; a change of size, place or resolution forgets sensor data but keeps maps.
 

@@ -52,6 +52,11 @@ class MoveBaseParams:
     stop_without_map: bool = param(
         False, doc="ours: stop while nobody publishes the map; false: drive on with the last one, as upstream"
     )
+    zones_file: str = param(
+        "",
+        doc="ours: file of keep-out zones, read again when it changes; state: house/zones.yaml in the guard's state"
+        " folder; empty: none",
+    )
     give_way: GiveWayParams = field(default_factory=GiveWayParams)
     movers: MoverParams = field(default_factory=MoverParams)
 

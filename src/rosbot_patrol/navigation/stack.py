@@ -9,6 +9,7 @@ import math
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.costmap.fed import FedCostmap
@@ -53,6 +54,7 @@ class NavigationStack:
         make_plans: makes the navigator's source of plans; called once, with this stack, when it has its planner.
         name: of the parameters in messages.
         now: time at the start.
+        zones: file of the owner's keep-out zones, which may be missing and may change; None: none.
 
     Raises:
         ParamError: a parameter is invalid.
@@ -75,10 +77,11 @@ class NavigationStack:
         *,
         name: str = "~",
         now: float = 0.0,
+        zones: Path | None = None,
     ) -> None:
         groups = [key for key, value in tree.items() if isinstance(value, dict)]
         p = self.params = load(MoveBaseParams, tree, name=name, ignore=[*groups, "recovery_behaviors"])
-        self._tree, self._name, self._frames = tree, name, frames
+        self._tree, self._name, self._frames, self._zones = tree, name, frames, zones
         self.global_costmap = self._make_costmap("global_costmap", now)
         self.local_costmap = self._make_costmap("local_costmap", now, keeps_last=True)
         self.planner = make_global_planner(p.base_global_planner, tree, name=name)
@@ -99,7 +102,7 @@ class NavigationStack:
 
     def _make_costmap(self, key: str, now: float, *, keeps_last: bool = False) -> FedCostmap:
         config = read_costmap(self._group(key), name=f"{self._name}{key}/")
-        return FedCostmap(config, self._frames, key, now=now, keeps_last=keeps_last)
+        return FedCostmap(config, self._frames, key, now=now, keeps_last=keeps_last, zones=self._zones)
 
     def _make_recoveries(self, p: MoveBaseParams) -> list[Recovery]:
         return make_recoveries(

@@ -28,7 +28,7 @@ def edge(parent: str, child: str, stamp: float, pose: Pose2D | None = None) -> E
 class Fed:
     """A costmap around a robot that stands at the origin of odom."""
 
-    def __init__(self, *layers: tuple[str, str], **groups: object) -> None:
+    def __init__(self, *layers: tuple[str, str], zones: Path | None = None, **groups: object) -> None:
         self.frames = TransformTree()
         tree = {
             "plugins": [{"name": name, "type": f"costmap_2d::{kind}"} for name, kind in layers],
@@ -41,7 +41,8 @@ class Fed:
             "transform_tolerance": 0.5,
             **groups,
         }
-        self.costmap = FedCostmap(read_costmap(tree), self.frames, "local_costmap", now=10.0, keeps_last=True)
+        config = read_costmap(tree)
+        self.costmap = FedCostmap(config, self.frames, "local_costmap", now=10.0, keeps_last=True, zones=zones)
 
     def stand(self, stamp: float) -> None:
         self.frames.add(edge("odom", "base_link", stamp))
@@ -149,3 +150,39 @@ def test_a_mask_from_a_file_is_no_map_of_a_topic(tmp_path: Path) -> None:
     assert fed.is_lethal(0.0, 0.0)
     with pytest.raises(MapError, match="nowhere"):
         Fed(("keepout", "KeepoutLayer"), keepout={"mask_file": str(tmp_path / "nowhere.yaml")})
+
+
+def square(x: float, y: float) -> str:
+    corners = [[x - 0.2, y - 0.2], [x + 0.2, y - 0.2], [x + 0.2, y + 0.2], [x - 0.2, y + 0.2]]
+    return f"zones: [{{name: corner, points: {corners}}}]\n"
+
+
+def test_zones_come_and_go_with_their_file(tmp_path: Path) -> None:
+    file = tmp_path / "zones.yaml"
+    fed = Fed(("inflation", "InflationLayer"), zones=file, inflation={"inflation_radius": 0.3})
+    fed.frames.add(edge("odom", "map", 10.0, Pose2D(0.5, 0.0)))
+
+    def update(at: float) -> None:
+        fed.stand(at)
+        fed.costmap.update(at)
+
+    update(10.0)
+    assert fed.costmap.is_current(10.0)  # nothing to wait for
+    file.write_text(square(1.0, 0.0))
+    update(10.1)
+    assert fed.is_lethal(1.5, 0.0)  # in odom
+    assert not fed.is_lethal(1.0, 0.0)
+    assert fed.costmap.costmap.grid.at(1.22, 0.0) > 0  # inflated
+    file.write_text("zones: [3]")
+    update(10.2)
+    assert fed.is_lethal(1.5, 0.0)
+    assert "the zones before stay" in fed.costmap.zones_problem
+    assert any("zones.yaml" in trouble for trouble in fed.costmap.troubles(10.2))
+    file.write_text(square(-1.0, 0.0) + "# elsewhere\n")
+    update(10.3)
+    assert fed.is_lethal(-0.5, 0.0)
+    assert not fed.is_lethal(1.5, 0.0)
+    file.unlink()
+    update(10.4)
+    assert not fed.is_lethal(-0.5, 0.0)
+    assert fed.costmap.zones_problem == ""

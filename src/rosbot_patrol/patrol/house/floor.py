@@ -7,13 +7,15 @@ of the map are no floor: the inside of a cupboard, or space beyond a window.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.zones import Zone, zones_mask
 
 Mask = NDArray[np.bool_]
 Array = NDArray[np.float64]
@@ -115,12 +117,13 @@ class Floor:
         return mask & _grown(~_grown(~mask, cells), cells)
 
 
-def floor_of(grid: Grid, *, free_below: int = 25) -> Floor:
+def floor_of(grid: Grid, *, free_below: int = 25, zones: Sequence[Zone] = ()) -> Floor:
     """Make the floor of a map.
 
     Args:
         grid: occupancy, -1 unknown, 0 free to 100 occupied.
         free_below: largest occupancy of a floor cell.
+        zones: that the robot keeps out of: floor, without clearance.
 
     Raises:
         MapError: the map is turned, or shows no floor.
@@ -131,7 +134,9 @@ def floor_of(grid: Grid, *, free_below: int = 25) -> Floor:
         raise MapError("the map", "shows no free cell, so that nobody can say what of a room was seen")
     fold = max(1, round(EDGE / grid.info.resolution))
     info, fine = _cropped(grid.info, is_floor, fold)
-    clearance = _clearance(fine, CLEARANCE_MOST / grid.info.resolution) * grid.info.resolution
+    fine_info = replace(info, resolution=grid.info.resolution, width=fine.shape[1], height=fine.shape[0])
+    open_to_robot = fine & ~zones_mask(zones, fine_info) if zones else fine
+    clearance = _clearance(open_to_robot, CLEARANCE_MOST / grid.info.resolution) * grid.info.resolution
     blocks = (info.height, fold, info.width, fold)
     free = fine.reshape(blocks).mean(axis=(1, 3)) >= 0.5
     coarse = clearance.reshape(blocks).max(axis=(1, 3))

@@ -6,6 +6,7 @@ import logging
 
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid
+from rosbot_patrol.maps.zones import Zone
 from rosbot_patrol.patrol.house.floor import floor_of
 from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
@@ -20,19 +21,20 @@ class HouseMap:
     Args:
         rooms: of the points file.
         health: told whether the map can be used, and which rooms are not on it.
+        zones: that the robot keeps out of.
 
     Attributes:
         house: floor and rooms; None before the first good map.
     """
 
-    def __init__(self, rooms: Rooms, health: Health) -> None:
-        self._rooms, self._health = rooms, health
+    def __init__(self, rooms: Rooms, health: Health, zones: tuple[Zone, ...] = ()) -> None:
+        self._rooms, self._health, self._zones = rooms, health, zones
         self.house: RoomRegions | None = None
 
     def hear(self, grid: Grid) -> None:
         """Part a map among the rooms; a bad one is refused."""
         try:
-            house = part_rooms(floor_of(grid), self._rooms)
+            house = part_rooms(floor_of(grid, zones=self._zones), self._rooms)
         except MapError as err:
             self.refuse(err)
             return

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.maps.zones import Zone
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.records.inputs import Battery, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.records.request import Request
@@ -36,6 +37,7 @@ class PatrolSenses:
         rooms: of the points file.
         alarm_classes: boxes of other classes are not measured.
         health: told how the senses are.
+        zones: that the robot keeps out of.
 
     Attributes:
         lidar, depth, camera, house_map: hear scans; depth pictures; lens and boxes; maps.
@@ -50,12 +52,13 @@ class PatrolSenses:
         rooms: Rooms,
         alarm_classes: Iterable[str],
         health: Health,
+        zones: tuple[Zone, ...] = (),
     ) -> None:
         self._health = health
         self._place = RobotPlace(transforms, params)
         self.lidar = Lidar(params, transforms, health)
         self.depth = DepthRing(eyes.depth_topic, health)
-        self.house_map = HouseMap(rooms, health)
+        self.house_map = HouseMap(rooms, health, zones)
         self.camera = Camera(
             eyes,
             params,

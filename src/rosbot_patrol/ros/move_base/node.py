@@ -41,6 +41,7 @@ from rosbot_patrol.ros.move_base.tuning import Tuning
 from rosbot_patrol.ros.runtime.logs import LineThrottle
 from rosbot_patrol.ros.runtime.node import Loop, now, run_node
 from rosbot_patrol.ros.runtime.process import Priority, give_back_large_blocks
+from rosbot_patrol.ros.runtime.state_folder import zones_file
 from rosbot_patrol.ros.runtime.transforms import Transforms
 
 log = logging.getLogger(__name__)
@@ -61,7 +62,8 @@ class MoveBaseNode:
         self._name = rospy.get_name() + "/"
         self._cycle = threading.RLock()
         self._transforms = Transforms()
-        self._stack = NavigationStack(tree, self._transforms, ThreadedPlans, name=self._name, now=now())
+        zones = zones_file(str(tree.get("zones_file", "")), rospy.get_namespace())
+        self._stack = NavigationStack(tree, self._transforms, ThreadedPlans, name=self._name, now=now(), zones=zones)
         self._stack.departed = self._departed
         self._navigator, self._controller = self._stack.navigator, self._stack.controller
         self._global, self._local = (CostmapNode(costmap) for costmap in self._stack.costmaps)

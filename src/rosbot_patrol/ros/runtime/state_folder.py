@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import IO
 
 from rosbot_patrol.errors import ParamError
+from rosbot_patrol.maps.zones import ZONES
+from rosbot_patrol.patrol.house.own_files import HOUSE
 from rosbot_patrol.ros.runtime.node import ros_home
 
 log = logging.getLogger(__name__)
@@ -27,6 +29,13 @@ def state_folder(given: str | Path | None, namespace: str) -> Path:
     if given:
         return Path(given).expanduser()
     return ros_home() / "-".join(["rosbot_patrol", *filter(None, namespace.split("/"))])
+
+
+def zones_file(given: str, namespace: str) -> Path | None:
+    """The file of the owner's keep-out zones: the given one, "state": that of the state folder, None for ""."""
+    if given == "state":
+        return state_folder(None, namespace) / HOUSE / ZONES
+    return Path(given).expanduser() if given else None
 
 
 def claim_folder(folder: Path, name: str) -> None:

@@ -8,6 +8,7 @@ from floors import TWO_ROOMS, drawn_floor, drawn_map
 
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.zones import Zone
 from rosbot_patrol.patrol.house.floor import _clearance, floor_of
 
 
@@ -69,3 +70,17 @@ def test_a_turned_map_is_refused() -> None:
     info = GridInfo(resolution=0.05, width=grid.info.width, height=grid.info.height, yaw=math.pi / 4)
     with pytest.raises(MapError, match="turned"):
         floor_of(Grid(info, grid.cells))
+
+
+def test_zones_are_floor_where_the_robot_does_not_go() -> None:
+    zone = Zone(name="corner", points=((1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)))
+    plain, floor = (floor_of(drawn_map(*TWO_ROOMS), zones=zones) for zones in ((), (zone,)))
+    assert (floor.free == plain.free).all()
+
+    def clearance(x: float, y: float) -> float:
+        ix, iy = floor.info.cell_of(x, y)
+        return float(floor.clearance[iy, ix])
+
+    assert clearance(1.5, 1.5) == 0.0
+    assert clearance(2.35, 1.5) == pytest.approx(0.35, abs=0.1)
+    assert clearance(6.0, 3.0) > 0.9
