@@ -118,15 +118,14 @@ def desk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
 
     monkeypatch.setattr(patrol_orders, "write_json", slowly)
     later: list[object] = []
-    made = patrol_orders.ArmingDesk(Arming(ArmingRules()), tmp_path / "arming.json", told.append, later.append)
-    return SimpleNamespace(desk=made, disk=disk, published=published, told=told, file=tmp_path / "arming.json")
+    kept = tmp_path / "arming.json"
+    made = patrol_orders.ArmingDesk(Arming(ArmingRules()), ROOMS, kept, told.append, later.append)
+    return SimpleNamespace(desk=made, disk=disk, published=published, told=told, file=kept)
 
 
 def test_a_change_of_the_mode_holds_up_no_step_and_is_answered_once_it_is_on_disk(desk) -> None:
     answers = []
-    service = threading.Thread(
-        target=lambda: answers.append(desk.desk._on_service(ArmRequest("disarmed"))), daemon=True
-    )
+    service = threading.Thread(target=lambda: answers.append(desk.desk._on_arm(ArmRequest("disarmed"))), daemon=True)
     service.start()
     assert desk.disk.is_writing.wait(10.0)
     guarded = in_time(lambda: desk.desk.step({}))
@@ -154,7 +153,7 @@ def test_every_change_is_told_with_who_and_from_where_and_what_changes_nothing_i
     for mode in modes:
         request = ArmRequest(mode)
         request._connection_header = {"callerid": "/kitchen_panel", "rosbot_patrol_peer": "192.168.1.7"}
-        desk.desk._on_service(request)
+        desk.desk._on_arm(request)
     assert [word.kind for word in desk.told] == kinds
     for word in desk.told:
         assert word.text.startswith("the mode is ")

@@ -17,7 +17,7 @@ from rosbot_patrol.sensors.supervisor import Supervisor
 def node() -> SensorWatch:
     """One without a master."""
     made = SensorWatch.__new__(SensorWatch)
-    made._guarded = None
+    made._guarded, made._muted = None, frozenset()
     made._watch = Supervisor(SensorList(None, {1: "hall", 2: "attic"}, "none"), WatchTimes(), 100.0)
     return made
 
@@ -30,6 +30,7 @@ def node() -> SensorWatch:
         (ArmingMsg(mode="armed_away", rooms=b"", exit_delay=20.0), set()),
         (ArmingMsg(mode="armed_home", rooms=bytes([2])), {2}),
         (ArmingMsg(mode="disarmed"), set()),
+        (ArmingMsg(mode="armed_away", all_rooms=True, muted=bytes([1])), {2}),
     ],
 )
 def test_the_patrols_word_holds_while_it_lives(message: ArmingMsg | None, guarded: set[int]) -> None:

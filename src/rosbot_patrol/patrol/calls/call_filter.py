@@ -122,7 +122,8 @@ class CallFilter:
     ) -> None:
         guarded = inputs.guarded
         if not guarded.counts(room.id):
-            why = guarded.why or f"{room.title} is not guarded in the mode {guarded.mode}"
+            is_muted = "it is muted" if room.id in guarded.muted else ""
+            why = guarded.why or is_muted or f"{room.title} is not guarded in the mode {guarded.mode}"
         elif _is_off_map(room, inputs) and not self._off_map.is_news(room.id, now):
             why = "its point is not on the map's floor, as was told a moment ago"
         elif not has_candidate and self._own_motion.explains(room, now):

@@ -6,6 +6,7 @@
 - Disarming ends missions started by sensors and rounds at once.
 - The mode survives restarts. A fresh install is armed_away without delays, so that the first patrol mails.
 - Setting the clock cannot make a delay longer.
+- A room can be muted for a while: calls of its sensors start no mission, in any mode.
 - `armed` means armed_away.
 """
 
@@ -23,12 +24,14 @@ from rosbot_patrol.errors import StateError
 from rosbot_patrol.files import read_json
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.guard.modes import DISARMED, MODES, parse_mode, unknown_mode
-from rosbot_patrol.patrol.guard.wall_times import Window, parse_window, parse_zone
-from rosbot_patrol.patrol.house.rooms import Rooms, choose_rooms
+from rosbot_patrol.patrol.guard.wall_times import Window, local, parse_window, parse_zone
+from rosbot_patrol.patrol.house.rooms import Room, Rooms, choose_rooms
 from rosbot_patrol.patrol.records.inputs import Guarded
 from rosbot_patrol.yaml_files import read_mapping
 
 log = logging.getLogger(__name__)
+
+MUTED_MOST = 86400.0  # [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,12 +120,18 @@ class Arming:
         self._exit_until: float | None = None
         self._entry_until: float | None = None
         self._seen: set[str] = set()
+        self._muted: dict[int, float] = {}  # until when, by room
         if memory:
             self._recall(memory)
 
     def snapshot(self) -> dict[str, Any]:
         """State that must survive a restart, for JSON."""
-        return {"mode": self.mode, "exit_until": self._exit_until, "entry_until": self._entry_until}
+        return {
+            "mode": self.mode,
+            "exit_until": self._exit_until,
+            "entry_until": self._entry_until,
+            "muted": dict(self._muted),
+        }
 
     def _recall(self, memory: Mapping[str, Any]) -> None:
         if memory.get("mode") not in MODES:
@@ -132,6 +141,11 @@ class Arming:
         for name in ("exit_until", "entry_until"):
             until = memory.get(name)
             setattr(self, f"_{name}", float(until) if isinstance(until, (int, float)) else None)
+        muted = memory.get("muted", {})
+        try:
+            self._muted = {int(room): float(until) for room, until in muted.items()}
+        except (AttributeError, TypeError, ValueError):
+            log.error("the muted rooms that were kept, %r, are none: no room is muted", muted)
 
     def arm(self, name: str, wall: float) -> tuple[bool, str]:
         """Change the mode.
@@ -155,6 +169,21 @@ class Arming:
         after = f"; it guards in {delay:.0f} s" if delay else ""
         return True, f"the mode is {mode} now, it was {was}{after}"
 
+    def mute(self, room: Room, seconds: float, wall: float) -> tuple[bool, str]:
+        """Let the sensors of a room start no mission for a while, 0: let them count again.
+
+        Returns:
+            Whether it was accepted, and one sentence.
+        """
+        if not 0.0 <= seconds <= MUTED_MOST:
+            return False, f"{room.title} cannot be muted for {seconds:g} s, expected 0 to {MUTED_MOST:g}"
+        self._muted.pop(room.id, None)
+        if not seconds:
+            return True, f"the sensors of {room.title} count again"
+        self._muted[room.id] = wall + seconds
+        until = local(self._muted[room.id], self._rules.zone)
+        return True, f"the sensors of {room.title} start no mission until {until:%H:%M}"
+
     def follow(self, missions: Mapping[str, int], wall: float) -> None:
         """Start the entry delay if a mission, by id, answers a new call from an entry room."""
         delay = self._rules.modes[self.mode].entry_delay
@@ -170,12 +199,14 @@ class Arming:
         self._exit_until = _still(self._exit_until, wall, mode.exit_delay)
         self._entry_until = _still(self._entry_until, wall, mode.entry_delay)
         is_leaving = self._exit_until is not None
+        self._muted = {room: until for room, until in self._muted.items() if _still(until, wall, MUTED_MOST)}
         return Guarded(
             mode=self.mode,
             rooms=frozenset() if is_leaving or self.mode == DISARMED else mode.rooms,
             why=self._why(wall),
             is_quiet=any(window.contains(wall, self._rules.zone) for window in self._rules.quiet_hours),
             holds_until=self._entry_until,
+            muted=dict(self._muted),
         )
 
     def exit_left(self, wall: float) -> float:

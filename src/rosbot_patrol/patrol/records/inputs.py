@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.goal import GoalLink
@@ -158,6 +159,7 @@ class Guarded:
         why: one sentence about what is not guarded, "" if everything is.
         is_quiet: quiet hours: nothing but triggers and people's orders moves the robot.
         holds_until: end of the running entry delay, in seconds since 1970: notices wait; None: no delay.
+        muted: rooms whose sensors start no mission, and until when, in seconds since 1970.
     """
 
     mode: str = "armed_away"
@@ -165,10 +167,11 @@ class Guarded:
     why: str = ""
     is_quiet: bool = False
     holds_until: float | None = None
+    muted: Mapping[int, float] = field(default_factory=dict)
 
     def counts(self, room_id: int) -> bool:
         """Whether a call of the room's sensor starts a mission."""
-        return self.rooms is None or room_id in self.rooms
+        return room_id not in self.muted and (self.rooms is None or room_id in self.rooms)
 
 
 @dataclass(frozen=True, kw_only=True)

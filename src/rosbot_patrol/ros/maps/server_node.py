@@ -26,10 +26,12 @@ from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.map_io import MapFile, read_grid, read_map_file
 from rosbot_patrol.maps.occupancy import Thresholds
 from rosbot_patrol.params import param
+from rosbot_patrol.patrol.house.own_files import own_file
 from rosbot_patrol.ros.messages.convert import grid_to_msg
 from rosbot_patrol.ros.messages.fast_arrays import GetMapFast, GridMsg, LoadMapFast
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.runtime.node import load_params, now, run_node
+from rosbot_patrol.ros.runtime.state_folder import state_folder
 
 log = logging.getLogger(__name__)
 
@@ -45,6 +47,10 @@ class MapServerParams:
     occupied_thresh: float = param(
         0.65, lo=0.0, hi=1.0, doc="darkness above which a cell is occupied (only for a bare image)"
     )
+    own_house: bool = param(
+        False, doc="ours: use the owner's map, in the guard's state folder, instead of one that comes with the program"
+    )
+    state_dir: str = param("", doc="ours: that folder; empty: rosbot_patrol in ROS's home")
     free_thresh: float = param(0.196, lo=0.0, hi=1.0, doc="darkness below which a cell is free (only for a bare image)")
 
 
@@ -138,7 +144,11 @@ def read_from_arguments(arguments: list[str], params: MapServerParams) -> tuple[
 def body() -> None:
     """Read and publish the map, then answer until shutdown."""
     params = load_params(MapServerParams)
-    grid, path = read_from_arguments(rospy.myargv(sys.argv)[1:], params)
+    arguments = rospy.myargv(sys.argv)[1:]
+    if params.own_house and len(arguments) == 1:
+        folder = state_folder(params.state_dir, rospy.get_namespace())
+        arguments = [own_file(arguments[0], folder, "map.yaml")]
+    grid, path = read_from_arguments(arguments, params)
     MapServer(params.frame_id, grid, path)
     rospy.spin()
 

@@ -5,7 +5,7 @@ Matches `patrol_robot` and `patrol_robot_simulation` of the tutorial: topics /mo
 
 Differs: see rosbot_patrol.patrol.mission.manager, .patrol.rooms, .patrol.spin and .alerts.mail. Additional:
 - It publishes /patrol/state, /patrol/alerts and /patrol/arming.
-- It has the action /patrol and the services /patrol/cancel, home, all, arm and emergency_stop.
+- It has the action /patrol and the services /patrol/cancel, home, all, arm, mute and emergency_stop.
 - It makes scheduled rounds, and keeps its outbox, queue and incidents in ~state_dir.
 - On shutdown it stops the robot and cancels its goal.
 - It makes only one action client, one tf listener and one publisher per topic.
@@ -34,11 +34,13 @@ from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.alerts.safe_text import one_line
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.maps.zones import ZONES, read_zones
 from rosbot_patrol.patrol.calls.journal import Journal
 from rosbot_patrol.patrol.guard.arming import Arming, ArmingRules, load_rules, read_memory
 from rosbot_patrol.patrol.guard.emergency import EmergencyStop
 from rosbot_patrol.patrol.guard.schedule import Schedule, load_schedule
-from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
+from rosbot_patrol.patrol.house.own_files import HOUSE
+from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.known_objects import FOUND_FALSE, KnownObjects
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import NodeParams
@@ -66,17 +68,23 @@ from rosbot_patrol.ros.patrol.pictures import PictureRing
 from rosbot_patrol.ros.patrol.sensor_watch_alive import Neighbour
 from rosbot_patrol.ros.patrol.settings import (
     NO_ROUNDS,
+    check_files,
     load_flat,
+    load_house,
     load_manager_params,
     load_or_say,
+    own_channels,
+    own_params,
+    watched_files,
 )
 from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.runtime.file_watch import FileWatch
 from rosbot_patrol.ros.runtime.node import Loop, now, run_node
 from rosbot_patrol.ros.runtime.private_files import keep_private
+from rosbot_patrol.ros.runtime.process import start_anew
 from rosbot_patrol.ros.runtime.state_folder import claim_folder, state_folder
 from rosbot_patrol.ros.runtime.transforms import Transforms
-from rosbot_patrol.sensors.sensor_file import load_sensors
 
 log = logging.getLogger(__name__)
 
@@ -89,15 +97,21 @@ class PatrolNode:
     def __init__(self) -> None:
         tree = rospy.get_param("~", {}) or {}
         refuse_passwords(tree)
-        self.params = load_flat(NodeParams, tree)
-        mail = load_flat(MailParams, tree)
-        rooms = load_rooms(Path(self.params.path_to_params).expanduser())
-        names = {room.id: room.name for room in rooms}
-        self.sensors = load_sensors(self.params.sensors, names, rooms_source=rooms.source)
-        folder = state_folder(self.params.state_dir, rospy.get_namespace())
+        given, mail = load_flat(NodeParams, tree), load_flat(MailParams, tree)
+        folder = state_folder(given.state_dir, rospy.get_namespace())
+        self._zones = folder / HOUSE / ZONES
+        files = watched_files(given, mail, folder)
+        given_mail = mail
+        self.params, mail = own_params(given, folder), own_channels(mail, folder)
+        rooms, self.sensors = load_house(self.params)
         keep_private(folder)
         claim_folder(folder, rospy.get_name() + "/state_dir")
         self.health = Health()
+
+        def check() -> None:
+            check_files(own_params(given, folder), own_channels(given_mail, folder))
+
+        self._files = FileWatch(files, check, self.health)
         evidence = load_flat(EvidenceParams, tree)
         self.pictures = PictureRing(self.params.image_topic, evidence)
         self.mission_log = MissionLog()
@@ -151,7 +165,7 @@ class PatrolNode:
         self._stop_switch = StopSwitch(stop, self.move_base, self._wheels.publisher, self.desk.write_later)
         kept = folder / "arming.json"
         memory = Arming(self.rules, read_memory(kept))
-        self._arming = ArmingDesk(memory, kept, self._tell_owner, self.desk.write_later)
+        self._arming = ArmingDesk(memory, rooms, kept, self._tell_owner, self.desk.write_later)
         self._orders = Orders(self.manager, rooms, self._stepping)
         self._actions = PatrolActions(self.manager, rooms)
 
@@ -160,7 +174,13 @@ class PatrolNode:
         topic = self.params.eyes.depth_topic
         eyes = dataclasses.replace(self.params.eyes, depth_topic=rospy.resolve_name(topic) if topic else "")
         senses = PatrolSenses(
-            params, eyes, Transforms(), rooms=rooms, alarm_classes=self.params.alarm_classes, health=self.health
+            params,
+            eyes,
+            Transforms(),
+            rooms=rooms,
+            alarm_classes=self.params.alarm_classes,
+            health=self.health,
+            zones=load_or_say(lambda path, _: read_zones(Path(path)), str(self._zones), rooms, (), self.health),
         )
         wake = self._loop.hurry
         calls = CallDesk(rooms, self.store, journal, latched_window=params.latched_window, wake=wake)
@@ -204,6 +224,7 @@ class PatrolNode:
     # -- step
 
     def _step(self, time_now: float) -> None:
+        is_free = False
         with self._stepping:
             if not self._is_over:
                 self.missed.step()
@@ -214,6 +235,9 @@ class PatrolNode:
                 self._publish(time_now, inputs, commands)
                 self._actions.follow(commands.ended, commands.report)
                 self._pulse.step()
+                is_free = self.manager.mission is None and not self.manager.queue
+        if not self._is_over and self._files.has_news() and is_free:
+            start_anew("its files have changed")
 
     def _inputs(self, time_now: float) -> Inputs:
         guarded = self._arming.step(self.manager.calls())

@@ -28,7 +28,7 @@ from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.ros.messages import convert
 from rosbot_patrol.ros.patrol.move_base import MoveBase
 from rosbot_patrol.ros.runtime.callers import CallerService, caller_of
-from rosbot_patrol.srv import Arm, ArmRequest, ArmResponse
+from rosbot_patrol.srv import Arm, ArmRequest, ArmResponse, Mute, MuteRequest, MuteResponse
 
 log = logging.getLogger(__name__)
 
@@ -122,6 +122,7 @@ class ArmingDesk:
 
     Args:
         arming: the mode.
+        rooms: that can be muted.
         path: file of the mode.
         tell: accepts a message for the owner, from any thread; returns at once.
         write_later: retries writes that the disk refused.
@@ -130,17 +131,20 @@ class ArmingDesk:
     def __init__(
         self,
         arming: Arming,
+        rooms: Rooms,
         path: Path,
         tell: Callable[[OwnerMessage], None],
         write_later: Callable[[Callable[[], None]], None],
     ) -> None:
-        self._arming, self._path, self._tell, self._write_later = arming, path, tell, write_later
+        self._arming, self._rooms, self._path = arming, rooms, path
+        self._tell, self._write_later = tell, write_later
         self._lock = threading.Lock()  # protects the mode; the step needs it, so nobody holds it during disk access
         self._keeping = threading.Lock()  # protects the file: one change after the other
         self._published: Guarded | None = None
         log.log(logging.WARNING if arming.mode == DISARMED else logging.INFO, "the mode is %s", arming.mode)
         self._publisher = rospy.Publisher("patrol/arming", ArmingMsg, queue_size=5, latch=True)
-        CallerService("patrol/arm", Arm, self._on_service)
+        CallerService("patrol/arm", Arm, self._on_arm)
+        CallerService("patrol/mute", Mute, self._on_mute)
 
     def step(self, calls: dict[str, int]) -> Guarded:
         """The armed rooms; `calls` are the rooms of missions, by id, started by sensors."""
@@ -153,19 +157,46 @@ class ArmingDesk:
                 self._publish(guarded, wall)
         return guarded
 
-    def _on_service(self, request: ArmRequest) -> ArmResponse:
-        """Change the mode at once; it is on disk before the answer."""
+    def _on_arm(self, request: ArmRequest) -> ArmResponse:
+        """Change the mode."""
         caller, wall = caller_of(request), time.time()
+        what = f"arming: %s; ordered by {caller} (service /patrol/arm)"
+
+        def tell(text: str) -> None:
+            self._tell(changed_word(self._arming.mode, text, caller, wall))
+
+        accepted, text = self._change(lambda: self._arming.arm(request.mode, wall), what, tell)
+        return ArmResponse(accepted=accepted, message=text)
+
+    def _on_mute(self, request: MuteRequest) -> MuteResponse:
+        """Mute a room, or let it count again."""
+        room = self._rooms.find(request.room)
+        if room is None:
+            return MuteResponse(accepted=False, message=self._rooms.refusal(request.room))
+        what = f"muting: %s; ordered by {caller_of(request)} (service /patrol/mute)"
+        accepted, text = self._change(lambda: self._arming.mute(room, request.seconds, time.time()), what, _nobody)
+        return MuteResponse(accepted=accepted, message=text)
+
+    def _change(
+        self, change: Callable[[], tuple[bool, str]], said: str, tell: Callable[[str], None]
+    ) -> tuple[bool, str]:
+        """Change something at once; it is on disk before the answer. Returns whether it was accepted, and a sentence.
+
+        Args:
+            change: does it.
+            said: for the log, with a place for the sentence.
+            tell: takes the sentence if anything has changed.
+        """
         with self._keeping:
             with self._lock:
                 before = self._arming.snapshot()
-                accepted, text = self._arming.arm(request.mode, wall)
+                accepted, text = change()
                 memory = self._arming.snapshot()
-            (log.warning if accepted else log.error)("arming: %s; ordered by %s (service /patrol/arm)", text, caller)
+            (log.warning if accepted else log.error)(said, text)
             if accepted and memory != before:
-                self._tell(changed_word(self._arming.mode, text, caller, wall))
+                tell(text)
             problem = self._keep(memory) if accepted else ""
-        return ArmResponse(accepted=accepted, message=text + (NOTED + problem if problem else ""))
+        return accepted, text + (NOTED + problem if problem else "")
 
     def _keep(self, memory: Mapping[str, Any]) -> str:
         """Save the mode; returns the problem, "" if there is none."""
@@ -189,8 +220,13 @@ class ArmingDesk:
         message.rooms = bytes(sorted(guarded.rooms or ()))
         message.exit_delay = self._arming.exit_left(wall)
         message.entry_delay = max(guarded.holds_until - wall, 0.0) if guarded.holds_until else 0.0
+        message.muted, message.muted_until = bytes(sorted(guarded.muted)), [u for _, u in sorted(guarded.muted.items())]
         message.why = guarded.why or f"the mode {guarded.mode} holds"
         self._publisher.publish(message)
+
+
+def _nobody(_text: str) -> None:
+    """Tell nobody."""
 
 
 def changed_word(mode: str, text: str, caller: str, wall: float) -> OwnerMessage:

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import tzinfo
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
 from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.errors import ParamError
+from rosbot_patrol.maps.zones import ZONES
 from rosbot_patrol.params import declared
 from rosbot_patrol.patrol.calls.queue import PriorityParams
+from rosbot_patrol.patrol.guard.arming import load_rules
 from rosbot_patrol.patrol.guard.battery import BatteryParams
-from rosbot_patrol.patrol.guard.schedule import Round
-from rosbot_patrol.patrol.house.rooms import Rooms
+from rosbot_patrol.patrol.guard.schedule import Round, load_schedule
+from rosbot_patrol.patrol.house.own_files import HOUSE, own_file, place_to_write
+from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.mission.drive import DriveParams
 from rosbot_patrol.patrol.mission.params import ManagerParams, NodeParams, manager_params
 from rosbot_patrol.patrol.search.look import LookParams
@@ -23,7 +30,8 @@ from rosbot_patrol.patrol.search.turn import SpinParams
 from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
 from rosbot_patrol.ros.runtime.diagnostics import WARN, Health
-from rosbot_patrol.ros.runtime.node import load_params
+from rosbot_patrol.ros.runtime.node import load_params, ros_home
+from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -33,6 +41,10 @@ log = logging.getLogger(__name__)
 P = TypeVar("P", bound="DataclassInstance")
 V = TypeVar("V")
 
+OWN = {"path_to_params": "rooms.yaml", "sensors": "sensors.yaml", "arming": "arming.yaml", "schedule": "schedule.yaml"}
+"""Parameters that name a file of the house, and the name of the owner's file."""
+
+CHANNELS = "channels.yaml"
 NO_ROUNDS: tuple[tuple[Round, ...], tzinfo | None] = ((), None)
 
 
@@ -59,6 +71,40 @@ def load_flat(cls: type[P], tree: dict[str, Any]) -> P:
 def load_manager_params(node: NodeParams, tree: dict[str, Any], prefix: str) -> ManagerParams:
     """Load the manager's parameters. Raises ParamError."""
     return manager_params(node, lambda cls: load_flat(cls, tree), prefix)
+
+
+def own_params(node: NodeParams, state_dir: Path) -> NodeParams:
+    """The node's parameters with the owner's copies of files that come with the program."""
+    own: dict[str, Any] = {key: own_file(getattr(node, key), state_dir, name) for key, name in OWN.items()}
+    return replace(node, **own)
+
+
+def own_channels(mail: MailParams, state_dir: Path) -> MailParams:
+    """The channels' parameters with the owner's file of channels, if there is one and none was given."""
+    return replace(mail, channels=own_file(mail.channels, state_dir, CHANNELS))
+
+
+def load_house(node: NodeParams) -> tuple[Rooms, SensorList]:
+    """Rooms and sensors; raises ParamError."""
+    rooms = load_rooms(Path(node.path_to_params).expanduser())
+    names = {room.id: room.name for room in rooms}
+    return rooms, load_sensors(node.sensors, names, rooms_source=rooms.source)
+
+
+def check_files(node: NodeParams, mail: MailParams) -> None:
+    """Load all files of the house; raises ParamError if one is wrong."""
+    rooms, _ = load_house(node)
+    make_channels(mail, Surroundings(home=ros_home(), environ=os.environ))
+    load_rules(node.arming, rooms)
+    load_schedule(node.schedule, rooms)
+
+
+def watched_files(node: NodeParams, mail: MailParams, state_dir: Path) -> list[Path]:
+    """All files that the node reads at its start, and the places where the owner's copies would be."""
+    given = {name: getattr(node, key) for key, name in OWN.items()} | {CHANNELS: mail.channels}
+    found = [Path(value).expanduser() for value in given.values() if value not in ("", "none")]
+    found += [place_to_write(value, state_dir, name) for name, value in given.items()]
+    return [*dict.fromkeys(found), state_dir / HOUSE / ZONES]
 
 
 def load_or_say(load: Callable[[str, Rooms], V], path: str, rooms: Rooms, without: V, health: Health) -> V:

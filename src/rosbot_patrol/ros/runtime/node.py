@@ -19,7 +19,7 @@ from rosbot_patrol import params
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.ros.runtime import greeting, logs, single_links
 from rosbot_patrol.ros.runtime.by_hand import require_master
-from rosbot_patrol.ros.runtime.process import Priority, take
+from rosbot_patrol.ros.runtime.process import Priority, follow_restart, take
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -60,6 +60,7 @@ def run_node(
     try:
         body()
         ending.finish()
+        follow_restart()
     except (PatrolError, OSError) as err:
         rospy.logfatal("%s: %s", rospy.get_name(), err)
         time.sleep(0.3)  # another thread sends /rosout

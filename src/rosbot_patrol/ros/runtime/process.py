@@ -9,7 +9,11 @@ import ctypes
 import enum
 import logging
 import os
+import sys
+import threading
 from pathlib import Path
+
+import rospy
 
 _AUTOGROUP = Path("/proc/self/autogroup")
 _RR = 1  # lowest real-time priority: before all ordinary threads, behind other real-time ones
@@ -90,3 +94,27 @@ def _set_option(option: int, value: int) -> bool:
         return bool(ctypes.CDLL(None).mallopt(option, value))
     except AttributeError:
         return False
+
+
+# -- a node that starts anew in its own process, as it does when its files have changed
+
+_ENDING = 10.0  # [s] for what a node does at its end
+_restarts: list[str] = []
+_has_ended = threading.Event()
+
+
+def start_anew(why: str) -> None:
+    """End the node, and start its program again in the same process once it has ended."""
+    log.info("starting anew: %s", why)
+    _restarts.append(why)
+    rospy.signal_shutdown(f"starts anew: {why}")
+    _has_ended.set()
+
+
+def follow_restart() -> None:
+    """Start the program again if that was asked for; returns if not."""
+    if _restarts:
+        _has_ended.wait(_ENDING)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])

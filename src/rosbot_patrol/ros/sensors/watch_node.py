@@ -15,7 +15,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +31,15 @@ from rosbot_patrol.files import read_json, write_json
 from rosbot_patrol.msg import Arming as ArmingMsg
 from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
+from rosbot_patrol.patrol.house.own_files import own_file, place_to_write
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.ros.bridge.links import links_from_msg
 from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import Health
+from rosbot_patrol.ros.runtime.file_watch import FileWatch
 from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node, sender_of
 from rosbot_patrol.ros.runtime.private_files import keep_private
+from rosbot_patrol.ros.runtime.process import start_anew
 from rosbot_patrol.ros.runtime.state_folder import state_folder
 from rosbot_patrol.ros.sensors.reports import Reports, event_to_msg, look_to_msg, states_to_msg
 from rosbot_patrol.sensors.looks import Looks
@@ -76,6 +79,18 @@ def load_group(cls: type, tree: Mapping[str, Any]) -> Any:
     return load_params(cls, tree=dict(tree), ignore=others | (set(tree) if cls is not GROUPS[0] else set()))
 
 
+def own_params(params: SensorWatchParams, state_dir: Path) -> SensorWatchParams:
+    """The parameters with the owner's copies of files that come with the program."""
+    sensors = own_file(params.sensors, state_dir, "sensors.yaml")
+    is_own = sensors not in (params.sensors, "")  # then the owner decides, not the simulator's file
+    return replace(
+        params,
+        path_to_params=own_file(params.path_to_params, state_dir, "rooms.yaml"),
+        sensors=sensors,
+        motion_sensors="" if is_own else params.motion_sensors,
+    )
+
+
 def load_list(params: SensorWatchParams) -> SensorList:
     """Load the sensors, checked against rooms and simulator; raises ParamError."""
     rooms = load_rooms(Path(params.path_to_params).expanduser())
@@ -85,21 +100,32 @@ def load_list(params: SensorWatchParams) -> SensorList:
     return sensors
 
 
+def _files(params: SensorWatchParams, mail: MailParams, state_dir: Path) -> list[Path]:
+    """All files that the node reads at its start, and the places where the owner's copies would be."""
+    given = {"rooms.yaml": params.path_to_params, "sensors.yaml": params.sensors, "channels.yaml": mail.channels}
+    found = [Path(value).expanduser() for value in given.values() if value not in ("", "none")]
+    return [*found, *(place_to_write(value, state_dir, name) for name, value in given.items())]
+
+
 class SensorWatch:
     """The node sensor_watch: inputs, one thread that steps the supervisor, outputs."""
 
     def __init__(self) -> None:
         tree = rospy.get_param("~", {}) or {}
         refuse_passwords(tree)
-        params = load_group(SensorWatchParams, tree)
+        given, mail = load_group(SensorWatchParams, tree), load_group(MailParams, tree)
+        folder = state_folder(given.state_dir, rospy.get_namespace())
+        params = own_params(given, folder)
         sensors = load_list(params)
-        folder = state_folder(params.state_dir, rospy.get_namespace())
         keep_private(folder)
         self._memory = folder / "sensors.json"
         self._health = Health("motion sensors")
-        self._post = OwnerPost(load_group(MailParams, tree), folder, self._health)
+        self._files = FileWatch(_files(given, mail, folder), lambda: load_list(own_params(given, folder)), self._health)
+        mail = replace(mail, channels=own_file(mail.channels, folder, "channels.yaml"))
+        self._post = OwnerPost(mail, folder, self._health)
         self._watch = Supervisor(sensors, load_group(WatchTimes, tree), time.monotonic())
         self._guarded: frozenset[int] | None = None  # guarded rooms, None for all
+        self._muted: frozenset[int] = frozenset()
         self._notices = Notices(
             load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory), is_guarded=self._is_guarded
         )
@@ -137,6 +163,7 @@ class SensorWatch:
 
     def _on_arming(self, message: ArmingMsg) -> None:
         self._guarded = None if message.all_rooms else frozenset(message.rooms)
+        self._muted = frozenset(message.muted)
 
     def _on_links(self, message: SensorLinks) -> None:
         # in simulated time both stamps come from one clock
@@ -148,6 +175,8 @@ class SensorWatch:
     def _is_guarded(self, room: int | None) -> bool:
         """Whether motion in a room is an alarm; an unknown room counts as guarded."""
         guarded = self._guarded
+        if room in self._muted:
+            return False
         is_patrol_gone = any(key.kind is Kind.PATROL_GONE for key in self._watch.problems())
         return guarded is None or room is None or room in guarded or is_patrol_gone
 
@@ -161,6 +190,9 @@ class SensorWatch:
                     return
                 raise
             count += 1
+            if self._files.has_news():
+                start_anew("its files have changed")
+                return
             time.sleep(STEP)
 
     def _step(self, count: int) -> None:

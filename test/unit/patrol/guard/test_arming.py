@@ -163,3 +163,42 @@ def test_a_bad_file_is_one_sentence_with_file_and_key(tmp_path, text, said):
         load(tmp_path, text)
     assert said in str(caught.value)
     assert "arming.yaml: " in str(caught.value)
+
+
+def test_a_muted_room_starts_no_mission_for_a_while_in_any_mode():
+    arming = Arming(RULES)
+    room = ROOMS.get(2)
+    accepted, text = arming.mute(room, 3600.0, 1000.0)
+    assert accepted
+    assert text.startswith("the sensors of room 2 (kitchen) start no mission until ")
+    assert not arming.step(1001.0).counts(2)
+    assert arming.step(1001.0).counts(1)
+    arming.arm("armed_home", 1002.0)
+    again = Arming(RULES, arming.snapshot())
+    assert not again.step(4599.0).counts(2)
+    assert again.step(4600.0).counts(2)
+
+
+def test_a_room_is_guarded_again_before_that():
+    arming = Arming(RULES)
+    arming.mute(ROOMS.get(2), 3600.0, 1000.0)
+    assert arming.mute(ROOMS.get(2), 0.0, 1001.0) == (True, "the sensors of room 2 (kitchen) count again")
+    assert arming.step(1001.0).counts(2)
+
+
+@pytest.mark.parametrize("seconds", [-1.0, 86401.0, float("nan")])
+def test_a_senseless_time_mutes_nothing(seconds):
+    arming = Arming(RULES)
+    assert not arming.mute(ROOMS.get(2), seconds, 1000.0)[0]
+    assert arming.step(1001.0).counts(2)
+
+
+def test_a_clock_that_goes_back_mutes_for_no_longer():
+    arming = Arming(RULES)
+    arming.mute(ROOMS.get(2), 86400.0, 1_000_000.0)
+    assert arming.step(900_000.0).counts(2)
+
+
+@pytest.mark.parametrize("muted", [[2], {"kitchen": 5.0}, {"2": "soon"}])
+def test_damaged_mutes_mute_nothing(muted):
+    assert Arming(RULES, {"mode": "night", "muted": muted}).step(1000.0).counts(2)
