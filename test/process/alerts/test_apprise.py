@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import socket
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote_plus
 
 import pytest
 
 pytest.importorskip("apprise", reason="needs Apprise: scripts/bootstrap")
+
+from push_server import serving
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError
 from rosbot_patrol.alerts.channels.config import Surroundings, load_channels
@@ -37,47 +36,6 @@ NOTICE = Notice(
 )
 
 
-class Server:
-    """Keeps what it is sent, and answers with a status."""
-
-    def __init__(self, status: int) -> None:
-        server = self
-        self.requests: list[tuple[str, str, dict[str, str], bytes]] = []
-
-        class Handler(BaseHTTPRequestHandler):
-            def _take(self) -> None:
-                body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-                server.requests.append((self.command, self.path, dict(self.headers), body))
-                answer = json.dumps({"error": f"{status} for {self.path}", "code": status}).encode()
-                self.send_response(status)
-                self.send_header("Content-Type", "application/json")
-                self.send_header("Content-Length", str(len(answer)))
-                self.end_headers()
-                self.wfile.write(answer)
-
-            do_POST = do_PUT = _take  # noqa: N815 - names of http.server
-
-            def log_message(self, *_: object) -> None:
-                """Say nothing."""
-
-        self.http = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        threading.Thread(target=self.http.serve_forever, daemon=True).start()
-
-    @property
-    def port(self) -> int:
-        return int(self.http.server_address[1])
-
-
-@contextmanager
-def serving(status: int = 200) -> Iterator[Server]:
-    server = Server(status)
-    try:
-        yield server
-    finally:
-        server.http.shutdown()
-        server.http.server_close()
-
-
 def test_ntfy_gets_title_reason_and_picture() -> None:
     with serving() as server:
         transport = AppriseTransport(f"ntfy://127.0.0.1:{server.port}/{TOPIC}", "push", 5.0)
@@ -90,6 +48,17 @@ def test_ntfy_gets_title_reason_and_picture() -> None:
     assert "Person seen" in said
     assert b" a picture " in sent
     assert any(TOPIC in path or TOPIC.encode() in body for _, path, _, body in server.requests)
+
+
+def test_ntfy_opens_the_page_and_has_a_button_that_marks_it_as_seen() -> None:
+    links = {"link": "http://robot.local:8420/incidents/1", "seen_link": "http://robot.local:8420/seen/1/abc"}
+    with serving() as server:
+        AppriseTransport(f"ntfy://127.0.0.1:{server.port}/{TOPIC}", "push", 5.0).send(replace(NOTICE, **links))
+    headers = {key.lower(): value for _, _, each, _ in server.requests for key, value in each.items()}
+    said = unquote_plus(" ".join(path for _, path, *_ in server.requests)) + f"{headers}"
+    assert headers.get("x-click") == links["link"]
+    assert headers.get("x-actions") == f"http, Seen, {links['seen_link']}, method=POST, clear=true"
+    assert links["link"] in said
 
 
 def test_a_json_service_gets_it_and_a_notice_without_a_picture() -> None:

@@ -12,11 +12,13 @@ import tempfile
 import time
 from email import message_from_bytes
 from pathlib import Path
+from urllib.parse import unquote_plus
 
 import pytest
 
 pytest.importorskip("aiosmtpd.smtp", reason="needs python3-aiosmtpd")
 from post_process import ENVELOPE, STALE
+from push_server import serving
 from real_smtp import RealSmtp
 
 from rosbot_patrol.alerts.outbox.notice import Notice
@@ -38,11 +40,11 @@ def kill(process):
     return said
 
 
-def crash(folder, kills, rng):
+def crash(folder, kills, rng, *push):
     """Kill by turns one who puts and one who delivers; returns what was promised, and what each channel has."""
     server, promised = RealSmtp(), []
     outbox, maildir = folder / "outbox", folder / "mail"
-    deliverers = [start("deliver", outbox, maildir, server.port) for _ in range(2)]  # one waits for its turn
+    deliverers = [start("deliver", outbox, maildir, server.port, *push) for _ in range(2)]  # one waits for its turn
     try:
         for i in range(kills):
             putter = start("put", outbox, f"p{i}")
@@ -51,7 +53,7 @@ def crash(folder, kills, rng):
             time.sleep(rng.uniform(0.0, 0.1))
             victim = rng.randrange(2)
             kill(deliverers[victim])
-            deliverers[victim] = start("deliver", outbox, maildir, server.port)
+            deliverers[victim] = start("deliver", outbox, maildir, server.port, *push)
             promised += kill(putter)
         deadline = time.monotonic() + 60.0
         while Outbox(outbox).waiting() and time.monotonic() < deadline:
@@ -83,6 +85,17 @@ def test_kills_lose_nothing(tmp_path):
     promised, left, mails, files = crash(tmp_path, 4, random.Random(7))
     assert len(promised) >= 4
     assert check(promised, left, mails, files) <= 4  # at most the one that was under way
+
+
+def test_kills_lose_nothing_on_its_way_to_a_phone(tmp_path):
+    pytest.importorskip("apprise", reason="needs Apprise: scripts/bootstrap")
+    with serving() as server:
+        promised, left, mails, files = crash(tmp_path, 3, random.Random(8), server.port)
+        check(promised, left, mails, files)
+    said = [unquote_plus(path) + " ".join(headers.values()) for _, path, headers, _ in server.requests]
+    bodies = [body.decode("utf-8", "replace") for *_, body in server.requests]
+    for name in promised:
+        assert any(name in each for each in (*said, *bodies)), name
 
 
 def test_one_that_is_stopped_is_replaced_and_nothing_comes_twice_when_it_goes_on(tmp_path):

@@ -116,6 +116,7 @@ def test_a_record_waits_for_the_seconds_after_a_sighting_but_not_for_good(house)
     roles = [file.role for file in house.check()["a"].files]
     assert roles.count("before") >= 20
     assert roles.count("after") >= 8
+    assert roles.count("clip") == 1
     assert not house.keeper.needs_pictures
     house.mission("b", "confirmed")
     house.keeper.see("b", 112.4)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import stat
 from pathlib import Path
 
 import pytest
 
 from rosbot_patrol.console.access.accounts import Accounts, Role
-from rosbot_patrol.console.access.door import Door, TooManyTries, session_secret
+from rosbot_patrol.console.access.door import Door, TooManyTries
 from rosbot_patrol.console.access.tries import Tries
 from rosbot_patrol.errors import AccessError
 
@@ -117,11 +116,3 @@ def test_whoever_came_before_the_first_owner_is_nobody_afterwards(tmp_path: Path
     assert door.present(local) == local
     door.accounts.add("Ada", Role.OWNER, PASSWORD)
     assert door.present(local) is None
-
-
-def test_the_secret_is_kept(tmp_path: Path) -> None:
-    path = tmp_path / "console" / "secret"
-    made = session_secret(path)
-    assert len(made) == 32
-    assert session_secret(path) == made
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600

@@ -162,7 +162,7 @@ def plain_text(notice: Notice) -> str:
     """What a notice says, for a reader of plain text."""
     text = "\n".join("".join(c if c.isprintable() else " " for c in line) for line in _lines(notice.text)).rstrip()
     table = "\n".join(f"{one_line(key) + ':':10}{one_line(value)}" for key, value in notice.facts)
-    return f"{text}\n\n{table}\n" if table else f"{text}\n"
+    return "\n\n".join(part for part in (text, one_line(notice.link), table) if part) + "\n"
 
 
 def _empty_mail(subject: str, mail_id: str, wall: float, envelope: Envelope) -> EmailMessage:

@@ -21,11 +21,15 @@ _PAGE = Template("""\
 <div style="font-size:14px;opacity:.9">$when</div>
 </div>
 $picture<div style="padding:16px 20px 4px;overflow-wrap:anywhere">$paragraphs</div>
-$table<div style="padding:12px 20px 20px;color:#78868e;font-size:12px;overflow-wrap:anywhere">
+$link$table<div style="padding:12px 20px 20px;color:#78868e;font-size:12px;overflow-wrap:anywhere">
 rosbot_patrol &middot; $id</div>
 </div></body></html>
 """)
 _PICTURE = Template('<img src="cid:$cid" alt="what the camera saw" style="display:block;width:100%;height:auto">\n')
+_LINK = Template(
+    '<div style="padding:0 20px 16px"><a href="$link" style="display:inline-block;padding:11px 18px;border-radius:8px;'
+    'background:#1565c0;color:#ffffff;text-decoration:none">Open in the console</a></div>\n'
+)
 _ROW = Template(
     '<tr><td style="padding:7px 12px 7px 0;color:#5c6b74;font-size:14px;vertical-align:baseline;white-space:nowrap;'
     'border-top:1px solid #e3e8eb">$name</td><td style="padding:7px 0;border-top:1px solid #e3e8eb;'
@@ -58,6 +62,7 @@ def html_page(notice: Notice, picture_cid: str = "") -> str:
         when=_clean(time.strftime("%A, %d %B %Y, %H:%M:%S", time.localtime(notice.wall))),
         picture=_PICTURE.substitute(cid=picture_cid) if picture_cid else "",
         paragraphs=_paragraphs(notice.text),
+        link=_LINK.substitute(link=_clean(notice.link)) if notice.link else "",
         table=f'<div style="padding:0 20px"><table style="border-collapse:collapse;width:100%">\n{rows}</table></div>\n'
         if rows
         else "",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from urllib.parse import urlsplit
 
 from rosbot_patrol.alerts.channels.transports.webhook import check_url
 from rosbot_patrol.params import param
@@ -12,6 +13,14 @@ KINDS = ("incident", "verdict", "sensor", "fault", "test")
 PASSWORD_VARIABLE = "ROSBOT_PATROL_SMTP_PASSWORD"
 MAIL_STYLES = ("plain", "tutorial")
 _SECURITY = ("auto", "none", "starttls", "tls")
+
+
+def _check_console(value: str) -> str | None:
+    """Problem of the console's address, None if it is one or empty."""
+    parts = urlsplit(value)
+    if not value or (parts.scheme in ("http", "https") and parts.netloc and value.isprintable() and " " not in value):
+        return None
+    return f"is {value!r}, expected an address such as http://robot.local:8420"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +56,11 @@ class MailParams:
         False, doc="allow sending the login without TLS (smtp_security: none) to another machine"
     )
     channels: str = param("", doc="file of further channels (docs/alerts.md); empty: none")
+    console_url: str = param(
+        "",
+        doc="address of the console as the owner's phone reaches it, for links in notices; empty: no links",
+        check=_check_console,
+    )
     notify_verdicts: list[str] = param(
         [],
         choices=("clear", "unreachable", "unverified"),

@@ -20,4 +20,4 @@ def body_of(notice: Notice) -> str:
         return notice.text[:_BODY]
     facts = dict(notice.facts)
     lines = [f"{one_line(facts[name])[:1].upper()}{one_line(facts[name])[1:]}" for name in _SAID if facts.get(name)]
-    return "\n".join(lines)[:_BODY]
+    return "\n".join(filter(None, ["\n".join(lines)[:_BODY], notice.link]))

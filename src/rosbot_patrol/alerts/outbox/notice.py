@@ -43,6 +43,8 @@ class Notice:
         picture: JPEG, None if there is none.
         picture_name: file name of it.
         channels: names of those that are asked; empty for all that take its kind.
+        link: web address of the page about it; "" for none.
+        seen_link: web address that marks its incident as seen by POST; "" for none.
 
     Raises:
         ValueError: an id that is none.
@@ -64,6 +66,8 @@ class Notice:
     picture: bytes | None = None
     picture_name: str = "picture.jpg"
     channels: tuple[str, ...] = ()
+    link: str = ""
+    seen_link: str = ""
 
     def __post_init__(self) -> None:
         if not _ID.fullmatch(self.id):
@@ -82,6 +86,7 @@ class Notice:
             tree |= {"called_id": self.called_id, "called_name": self.called_name}
         if self.place:
             tree["place"] = self.place
+        tree |= {name: value for name in _LINKS if (value := getattr(self, name))}
         if self.picture is not None:
             tree["picture"] = base64.b64encode(self.picture).decode("ascii")
         tree["check"] = _check(tree)
@@ -131,6 +136,7 @@ class Notice:
             facts=tuple((str(name), str(value)) for name, value in tree["facts"]),
             channels=tuple(map(str, tree["channels"])),
             picture=data,
+            **{name: str(tree.get(name, "")) for name in _LINKS},
             **texts,
         )
 
@@ -140,4 +146,5 @@ def _check(tree: dict[str, Any]) -> str:
     return f"{zlib.crc32(json.dumps(tree, sort_keys=True).encode()):08x}"
 
 
+_LINKS = ("link", "seen_link")
 _TEXTS = ("id", "kind", "subject", "text", "room_name", "verdict", "incident", "picture_name")

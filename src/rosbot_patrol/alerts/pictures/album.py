@@ -80,6 +80,11 @@ class Album:
         shelf = self._shelves.get(incident_id)
         return shelf is None or shelf.clip is None or shelf.clip.is_over(ring)
 
+    def has_all(self, incident_id: str) -> bool:
+        """Whether the seconds about a record's sighting were taken."""
+        shelf = self._shelves.get(incident_id)
+        return shelf is not None and shelf.clip is None and shelf.count > 0
+
     def take(self, incident_id: str, ring: EvidenceRing) -> list[NewFile]:
         """New files about a sighting, encoded."""
         shelf = self._shelves.get(incident_id)

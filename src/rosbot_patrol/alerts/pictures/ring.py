@@ -24,7 +24,7 @@ class EvidenceParams:
     """Which camera pictures are kept for an incident."""
 
     evidence_before: float = param(5.0, unit="s", lo=0.0, hi=30.0, doc="length of the clip before a sighting")
-    evidence_after: float = param(10.0, unit="s", lo=0.0, hi=120.0, doc="length of the clip after a sighting")
+    evidence_after: float = param(20.0, unit="s", lo=0.0, hi=120.0, doc="length of the clip after a sighting")
     evidence_rate: float = param(5.0, unit="Hz", lo=0.2, hi=15.0, doc="pictures per second in the clip")
     evidence_mb: float = param(
         40.0, unit="MB", lo=4.0, hi=1000.0, doc="memory for recent pictures; when full, the oldest are dropped"

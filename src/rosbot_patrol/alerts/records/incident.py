@@ -58,7 +58,7 @@ class StoredFile:
 
     Attributes:
         name: in that folder.
-        role: detection (the notice's picture), best, before, after, look, map, other.
+        role: detection (the notice's picture), best, before, after, clip, look, map, other.
         sha256: of its bytes, in hex; size: of it [bytes].
         stamp: time of a picture by the robot's clock [s]; None for other files.
         caption: for people.

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import secrets
 import threading
 from collections.abc import Callable
-from pathlib import Path
 
 from itsdangerous import BadData, URLSafeTimedSerializer
 
 from rosbot_patrol.console.access.accounts import Account, Accounts
 from rosbot_patrol.console.access.tries import Tries
 from rosbot_patrol.errors import AccessError
-from rosbot_patrol.files import write_atomic
 
 COOKIE = "rosbot_patrol_session"
 MAX_AGE = 30 * 86400  # [s] of a session
@@ -111,13 +108,3 @@ class Door:
                 tries.succeed(key)
             else:
                 tries.fail(key, self._clock())
-
-
-def session_secret(path: Path) -> bytes:
-    """The secret that signs the cookies, made at the first start. Raises OSError."""
-    if path.exists() and len(found := path.read_bytes()) >= 32:
-        return found
-    made = secrets.token_bytes(32)
-    write_atomic(path, made)
-    path.chmod(0o600)
-    return made

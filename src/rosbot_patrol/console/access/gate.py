@@ -4,7 +4,8 @@
   point to 127.0.0.1 (DNS rebinding) asks by that name, and is refused.
 - What changes something, and every websocket, has to come from a page of this console (`Origin`): a stranger's page
   cannot give orders with the session of its visitor.
-- All but the sign-in page and the parts that draw it needs a session.
+- All but the sign-in page and the parts that draw it needs a session. An address in a notice marks its incident as seen
+  without one, by a token of its own.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from rosbot_patrol.console.access.accounts import Account
 from rosbot_patrol.console.access.door import COOKIE, Door
+
+SEEN_PATH = "/seen/"
 
 _LOCAL_NAMES = {"localhost", "127.0.0.1", "[::1]"}
 _PUBLIC = ("/sign-in", "/manifest.webmanifest", "/icon-192.png", "/icon-512.png", "/favicon.ico", "/style.css")
@@ -82,7 +85,7 @@ class Gate:
             name = host.rpartition(":")[0] if not host.endswith("]") and ":" in host else host
             if name not in _LOCAL_NAMES or not _is_local(scope):
                 return "Until an owner has a password, this page is for the robot's own machine: http://localhost"
-        if scope["type"] == "http" and scope["method"] in ("GET", "HEAD"):
+        if scope["type"] == "http" and (scope["method"] in ("GET", "HEAD") or scope["path"].startswith(SEEN_PATH)):
             return ""
         origin = headers.get("origin", "")
         if urlsplit(origin).netloc != host or not host:
@@ -104,7 +107,7 @@ def _is_local(scope: Scope) -> bool:
 
 
 def _is_public(scope: Scope) -> bool:
-    return scope["type"] == "http" and scope["path"] in _PUBLIC
+    return scope["type"] == "http" and (scope["path"] in _PUBLIC or scope["path"].startswith(SEEN_PATH))
 
 
 def _sign_in(scope: Scope, headers: Mapping[str, str]) -> PlainTextResponse | RedirectResponse:

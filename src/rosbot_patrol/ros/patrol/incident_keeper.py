@@ -17,6 +17,7 @@ from pathlib import Path
 import rospy
 
 from rosbot_patrol.alerts.pictures.album import Album, Sighting
+from rosbot_patrol.alerts.pictures.clip import CLIP, encode_clip
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
 from rosbot_patrol.alerts.records.files import REPORT, NewFile
 from rosbot_patrol.alerts.records.incident import Event, Incident
@@ -27,7 +28,7 @@ from rosbot_patrol.alerts.records.retention import Pruned, RetentionParams, keep
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.report.page import write_report
 from rosbot_patrol.counts import count_of
-from rosbot_patrol.errors import StoreError
+from rosbot_patrol.errors import AlertError, StoreError
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.story.mission_log import Entry
 from rosbot_patrol.ros.patrol.mission_map import MissionMap
@@ -91,6 +92,10 @@ class _Report:
         """Report that nothing can be written."""
         self._health.set("incidents", ERROR, f"incidents cannot be written: {err}")
 
+    def no_clip(self, problem: str) -> None:
+        """Report why the last clip was not made, "" if it was."""
+        self._health.set("clips", WARN if problem else OK, problem or "clips are made")
+
     def complain(self, err: StoreError) -> None:
         """Log a problem; the same one at most once a minute."""
         text, at = self._complaint
@@ -132,6 +137,7 @@ class IncidentKeeper:
         self._entries: deque[Entry | tuple[str, NewFile]] = deque()
         self._seen: deque[tuple[str, float]] = deque()
         self._closing: dict[str, _Closing] = {}
+        self._clipped: set[str] = set()
         self._looking = ""
         self._is_ending = self._gives_way = False
         self._lost = 0
@@ -231,6 +237,7 @@ class IncidentKeeper:
         for incident_id in [i for i, closing in self._closing.items() if self._is_due(i, closing)]:
             self._close(store, incident_id, self._closing[incident_id])
             del self._closing[incident_id]
+            self._clipped.discard(incident_id)
         self._tidy(store)
         return _BUSY if self._looking or self._closing or self._album.is_waiting else _IDLE
 
@@ -307,6 +314,7 @@ class IncidentKeeper:
                 files += self._album.look(incident_id, ring)
             if files:
                 store.add_files(incident_id, files)
+            self._add_clip(store, incident_id)
         for problem in self._album.problems:
             log.error("%s", problem)
         self._album.problems.clear()
@@ -320,6 +328,7 @@ class IncidentKeeper:
         kept = store.get(incident_id)
         if kept is None:
             return
+        self._add_clip(store, incident_id)
         if closing.files is None:
             closing.files = [*self._album.finish(incident_id), *self._map.draw(kept)]
         if kept.closed is None:
@@ -329,6 +338,26 @@ class IncidentKeeper:
             write_report(store, incident)
         log.info("incident %s is on record: %s", incident.id, incident.verdict)
         self._tidy_at = 0.0
+
+    def _add_clip(self, store: IncidentStore, incident_id: str) -> None:
+        """Make the video of the seconds about a sighting, once they are over; not while the program ends."""
+        if self._is_ending or incident_id in self._clipped or not self._album.has_all(incident_id):
+            return
+        self._clipped.add(incident_id)
+        kept = store.get(incident_id)
+        if kept is None:
+            return
+        files = [file for file in kept.files if file.role in ("before", "after")]
+        try:
+            read = ((file.stamp or 0.0, store.folder.read(incident_id, file.name)) for file in files)
+            data = encode_clip(sorted(read, key=lambda picture: picture[0]))
+        except (AlertError, StoreError) as err:
+            log.error("%s", err)
+            self._report.no_clip(str(err))
+            return
+        self._report.no_clip("")
+        if data is not None:
+            store.add_files(incident_id, [NewFile(name=CLIP, role="clip", data=data, caption="clip")])
 
     # -- the disk
 

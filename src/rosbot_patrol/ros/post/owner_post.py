@@ -13,9 +13,11 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import rospy
 
@@ -33,6 +35,7 @@ from rosbot_patrol.alerts.outbox.disk_watch import DiskWatch
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.alerts.outbox.receipts import Receipt
+from rosbot_patrol.console.access.secret import console_secret, seen_token
 from rosbot_patrol.patrol.calls.repeats import Repeats
 from rosbot_patrol.ros.post.health import PostHealth
 from rosbot_patrol.ros.runtime.diagnostics import Health
@@ -124,10 +127,24 @@ class OwnerPost:
 
     def put(self, notice: Notice) -> bool:
         """Keep a notice until it is delivered, even if the disk fails. Returns whether it is on the disk."""
-        is_on_disk = self._box.put(notice)
+        is_on_disk = self._box.put(self._with_links(notice))
         if is_on_disk:
             self._wake.set()
         return is_on_disk
+
+    def _with_links(self, notice: Notice) -> Notice:
+        """A notice about an incident with the address of its page, if the console's is known."""
+        base = self._mail.console_url.rstrip("/")
+        if not base or not notice.incident or notice.link:
+            return notice
+        name = quote(notice.incident, safe="")
+        linked = replace(notice, link=f"{base}/incidents/{name}")
+        try:
+            token = seen_token(console_secret(self._state_dir), notice.incident)
+        except OSError as err:
+            log.warning("the notice cannot be acknowledged on the phone: %s", err)
+            return linked
+        return replace(linked, seen_link=f"{base}/seen/{name}/{token}")
 
     def keep(self, notice: Notice) -> None:
         """Put a notice as in `put`, on another thread; returns at once."""

@@ -128,3 +128,13 @@ def test_a_verdict_without_anybody_is_told_in_its_own_words(make_incident, envel
     text = mail.get_body(("plain",)).get_content()
     assert text.startswith("The robot was there but could not be sure")
     assert "42 % of the floor" in text
+
+
+def test_a_notice_about_an_incident_links_to_its_page(make_incident, envelope):
+    link = "http://robot.local:8420/incidents/1?<b>"
+    notice = replace(incident_notice(make_incident(), None), link=link, seen_link="http://robot.local:8420/seen/1/abc")
+    mail = read_back(build_mail(notice, envelope))
+    assert link in mail.get_body(("plain",)).get_content().splitlines()
+    page = mail.get_body(("html",)).get_content()
+    assert 'href="http://robot.local:8420/incidents/1?&lt;b&gt;"' in page
+    assert "/seen/" not in mail.as_string()

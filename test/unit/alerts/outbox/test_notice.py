@@ -18,6 +18,7 @@ def make(**given):
         {"picture": bytes(range(256)), "picture_name": "room3.jpg"},
         {"picture": b""},
         {"facts": (("Room", "3"), ("Why", "a\nb")), "channels": ("mail", "phone")},
+        {"link": "http://robot.local:8420/incidents/1", "seen_link": "http://robot.local:8420/seen/1/abc"},
         {"text": "lone \udcff surrogate, \0 and \u2028"},
     ],
 )

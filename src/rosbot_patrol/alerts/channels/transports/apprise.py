@@ -10,6 +10,7 @@ import importlib
 import logging
 import threading
 from typing import Any
+from urllib.parse import quote
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError
 from rosbot_patrol.alerts.channels.masking import Mask, url_secrets
@@ -59,11 +60,18 @@ class AppriseTransport:
         self._channel, self._timeout, self._with_picture = name, timeout, with_picture
         self._mask = Mask([url, *url_secrets(url), *_user_and_password(url)])
         joint = "&" if "?" in url else "?"
-        timed = f"{url}{joint}cto={timeout:g}&rto={timeout:g}"
+        self._url = f"{url}{joint}cto={timeout:g}&rto={timeout:g}"
         logging.getLogger(_LOGGER).propagate = False  # its words may repeat the address
-        self._service: Any = self._apprise.Apprise.instantiate(timed, suppress_exceptions=True)
+        self._service = self._make("")
         if self._service is None:
             raise NoService
+
+    def _make(self, more: str) -> Any:
+        """The service with more parameters in its address, None if Apprise does not know it."""
+        service = self._apprise.Apprise.instantiate(self._url + more, suppress_exceptions=True)
+        if service is not None:
+            service.request_rate_per_sec = 0.0  # the channel has a pace of its own
+        return service
 
     def describe(self) -> str:
         """Which service; its address is secret."""
@@ -90,12 +98,21 @@ class AppriseTransport:
 
     def _notify(self, notice: Notice) -> bool:
         target = self._apprise.Apprise()
-        target.add(self._service)
+        target.add(self._service if not notice.link else self._make(_links(self._url, notice)) or self._service)
         attached = None
         if notice.picture is not None and self._with_picture:
             memory = importlib.import_module("apprise.attachment.memory")
             attached = memory.AttachMemory(notice.picture, name=notice.picture_name, mimetype="image/jpeg")
         return bool(target.notify(title=title_of(notice), body=body_of(notice), attach=attached))
+
+
+def _links(url: str, notice: Notice) -> str:
+    """Parameters of a service that opens a link, or has a button, beside the text."""
+    schema, link = url.partition("://")[0].lower(), quote(notice.link, safe="")
+    if schema in ("ntfy", "ntfys"):
+        ack = f"http, Seen, {notice.seen_link}, method=POST, clear=true" if notice.seen_link else ""
+        return f"&click={link}" + (f"&actions={quote(ack, safe='')}" if ack else "")
+    return f"&supplemental_url={link}&supplemental_url_title=Open" if schema == "pover" else ""
 
 
 def _user_and_password(url: str) -> list[str]:

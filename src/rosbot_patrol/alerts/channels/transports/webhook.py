@@ -193,6 +193,8 @@ def document(notice: Notice, *, with_picture: bool = True) -> bytes:
         "verdict": notice.verdict,
         "incident": notice.incident,
     }
+    if notice.link:
+        tree["link"] = notice.link
     if notice.room_id >= 0:
         tree["room"] = {"id": notice.room_id, "name": notice.room_name}
     if notice.place:
