@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.patrol.records.activity import ON_GUARD, Activity, activity_of, is_away, is_full_turn
@@ -98,7 +99,7 @@ class Narrator:
         if mission:
             mission.mails.append(report.location)
         if report.transport == "maildir":
-            return [f"The mail lies in {report.location}"]
+            return [f"The mail lies in the Maildir {Path(report.location).parent.parent}."]
         return [f"The mail was sent to {report.location} by {report.transport}."]
 
     def is_complete(self, mission: MissionSummary) -> bool:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import rospy
 
+from rosbot_patrol.alerts.records.files import REPORT
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import Alert, EspTrigger, PatrolState
 from rosbot_patrol.params import param
@@ -61,6 +62,7 @@ class NarratorNode:
         self._began = time.monotonic()
         self._ended_at: float | None = None
         self._hinted = False
+        self._record = ""  # folder of the last mission's record
         self._page_at: float | None = self._began  # when to look for the console's address again
         file = self.params.scenario
         self._scenario = ScenarioWatch(file, self.params.simulator, self._tell) if file else None
@@ -130,8 +132,9 @@ class NarratorNode:
                 self._print([self.params.on_guard_hint] if self.params.on_guard_hint else [])
 
     def _on_alert(self, message: Alert) -> None:
-        if message.kind == Alert.VERDICT:
-            return  # the state reports it
+        if message.kind == Alert.VERDICT:  # the state reports it
+            self._record = message.location
+            return
         report = AlertTelling(
             id=message.id,
             room=f"room {message.room_id} ({message.room_name})",
@@ -182,6 +185,10 @@ class NarratorNode:
     def _finish(self, status: int) -> None:
         with self._lock:
             self._print([_ENDS[status].format(p=self.params)] if status else [])
+            if self._record:
+                record = Path(self._record)
+                self._print([f"What happened, with pictures: {record / REPORT}"])
+                rospy.set_param("~incident", record.name)
         self._write_summary()
 
     def _write_summary(self) -> None:

@@ -44,7 +44,7 @@ def test_a_whole_patrol():
         "Arrived in room 3 (kitchen).",
         "Turning once to look around in room 3 (kitchen).",
         "INTRUDER: a person seen on the mission to room 3 (kitchen), probability 0.91. The notice is on disk.",
-        "The mail lies in /mail/new/1",
+        "The mail lies in the Maildir /mail.",
         "Driving home. Confirmed: person seen in room 3 (kitchen).",
         "Home again. Verdict for room 3 (kitchen): confirmed.",
         "On guard (at home again; confirmed: person seen in room 3).",
