@@ -137,6 +137,7 @@ class House:
             "detector_timeout": 1.0,
             "linger": 0.3,
             "retry_delay": 0.2,
+            "evidence_after": 3.0,  # a record waits for its pictures
             **params,
         }
         self.states.clear()

@@ -152,6 +152,7 @@ def test_the_emergency_stop_and_the_mode_are_kept_once_the_disk_is_back(house, d
     assert json.loads((disk / "arming.json").read_text())["mode"] == "disarmed"
 
 
+@pytest.mark.long
 def test_sensor_watch_starts_and_tells_without_a_disk(house, phone):
     (house.folder / "file").write_text("")
     levels = listen(house)

@@ -129,6 +129,7 @@ def test_encodings(ros, models):
         assert line["counts"] == [0 if grey else 1], line
 
 
+@pytest.mark.long
 def test_pictures_that_make_no_sense(ros, models):
     node = start(ros, models)
     *said, alive = play(ros, "nonsense")

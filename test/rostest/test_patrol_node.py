@@ -110,6 +110,7 @@ def test_unknown_room_is_refused_and_the_node_lives(house):
     assert "there is no room 99" in house.log(house.patrol)
 
 
+@pytest.mark.long
 def test_triggers_of_a_mission_wait_in_order(house):
     house.start_move_base()
     house.start_patrol()

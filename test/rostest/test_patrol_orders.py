@@ -78,6 +78,7 @@ def test_action_services_and_arming(house):
     subscriber.unregister()
 
 
+@pytest.mark.long
 def test_the_emergency_stop_holds_over_a_kill(house):
     from std_msgs.msg import Bool
     from std_srvs.srv import SetBool

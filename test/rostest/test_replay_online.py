@@ -114,6 +114,7 @@ def test_amcl_goes_the_same_way(sim_ros: Ros, tmp_path: Path) -> None:
     assert np.abs(wrap_angles(there[:, 2] - expected["yaw"][k]))[same].max() < 0.05
 
 
+@pytest.mark.long
 def test_slam_gmapping_makes_the_same_map(sim_ros: Ros, tmp_path: Path) -> None:
     parameters(sim_ros, "room_slam", "slam_gmapping")
     node = sim_ros.node("slam_gmapping", "__name:=slam_gmapping")

@@ -162,6 +162,7 @@ def test_a_motor_that_stalls_is_told_and_started_again(ros, listener, tmp_path):
     wait_for(lambda: len(scans(listener)) > before + 1, what="scans again")
 
 
+@pytest.mark.long
 def test_the_start_that_fails_is_told_in_upstreams_words_and_explained(ros, tmp_path):
     lidar = Lidar(ros, tmp_path, "A3", any_speed=False)
 

@@ -246,6 +246,7 @@ def test_a_bad_file_is_one_sentence(ros, tmp_path):
     assert watch.node.popen.wait(PATIENCE) == 1
 
 
+@pytest.mark.long
 def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(sim_ros, tmp_path):
     """Nor is it lost where the disk takes nothing. Simulated time that stands still (no /clock) changes nothing."""
     ros = sim_ros

@@ -155,6 +155,7 @@ def test_a_doorway_a_wheel_and_a_robot_that_is_carried(ros):
     wait_for(pivots, 10.0, "wheels of one side that turn alone")
 
 
+@pytest.mark.long
 def test_a_motion_sensor_flaps_reboots_and_falls_silent_over_tcp(ros, tmp_path):
     port = free_port()
     sensors = tmp_path / "sensors.yaml"
