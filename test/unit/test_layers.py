@@ -57,7 +57,15 @@ ROWS_INSIDE: dict[str, list[set[str]]] = {
         {"search", "story", "senses"},
         {"mission"},
     ],
-    "console": [{"words"}, {"access"}, {"live"}, {"sentences", "home_assistant"}, {"pages"}, {"web"}],
+    "console": [
+        {"words"},
+        {"told"},
+        {"access", "house"},
+        {"live"},
+        {"sentences", "home_assistant"},
+        {"pages"},
+        {"web"},
+    ],
     "rosserial": [{"protocol"}, {"server", "device"}],
     "ros": [
         {"runtime", "messages"},

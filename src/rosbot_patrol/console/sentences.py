@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.alerts.records.incident import NO_ROOM, Incident, Place
 from rosbot_patrol.alerts.records.query import Found
+from rosbot_patrol.console.live.day_log import Entry
 from rosbot_patrol.console.live.house_state import ArmingNow, GuardNow, HouseState
 from rosbot_patrol.console.words import Words
 
@@ -111,6 +112,29 @@ def title_of(found: Found | Incident, _: Words) -> str:
             else f"{found.object_class}: {room}"
         )
     return room
+
+
+def day_line(entry: Entry, _: Words) -> tuple[str, str]:
+    """Icon and sentence of an entry of the log of the last day."""
+    is_on = entry.what == "on"
+    if entry.kind == "mission":
+        return "directions_run", _("To {room}: {reason}.").format(room=entry.room, reason=origin_text(entry.what, _))
+    if entry.kind == "verdict":
+        verdict = verdict_name(entry.what, _)
+        return "gavel", f"{entry.room}: {verdict}" if entry.room else verdict
+    if entry.kind == "mode":
+        return ICONS.get(entry.what, "lock"), _("Mode: {name}").format(name=mode_name(entry.what, _))
+    if entry.kind == "problem":
+        return "error", entry.text or entry.what
+    sentences = {
+        "guard": ("shield", _("The guard runs."), _("The guard does not answer.")),
+        "stop": ("pan_tool", _("The emergency stop is pressed."), _("The emergency stop is released.")),
+        "charging": ("battery_charging_full", _("The robot charges."), _("The robot has left its charger.")),
+    }
+    if entry.kind in sentences:
+        icon, on, off = sentences[entry.kind]
+        return icon, on if is_on else off
+    return "check", _("Well again: {what}").format(what=entry.what)
 
 
 def ago(seconds: float | None, _: Words) -> str:

@@ -137,3 +137,10 @@ def test_no_page_may_stand_in_a_frame(accounts: Accounts) -> None:
     answer = client_of(accounts).get("/sign-in")
     assert answer.headers["x-frame-options"] == "DENY"
     assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
+
+
+def test_a_notices_address_needs_no_session_and_no_page(accounts: Accounts) -> None:
+    client = client_of(accounts, "http://robot.local:8420", "192.168.1.9")
+    assert client.post("/seen/1/abc").text == "nobody"
+    assert client.post("/seen").status_code == 403
+    assert client.post("/seen/../incidents").status_code == 403

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from rosbot_patrol.maps.zones import Zone
+from rosbot_patrol.patrol.intruder.known_objects import KnownObject
+
 Point = tuple[float, float]
 
 
@@ -43,6 +46,7 @@ class ArmingNow:
     entry_delay: float = 0.0
     is_quiet: bool = False
     why: str = ""
+    muted: tuple[tuple[int, float], ...] = ()  # rooms, and until when, in seconds since 1970
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +81,24 @@ class Problem:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RoomMark:
+    """A room on the map: number, name, the point to look from [m]."""
+
+    id: int
+    name: str
+    x: float
+    y: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Call:
+    """The last motion that a sensor reported: its id, and when by the steady clock [s]."""
+
+    sensor: int
+    at: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class HouseState:
     """Everything that changes seldom.
 
@@ -87,6 +109,10 @@ class HouseState:
         sensors: all that are watched.
         problems: warnings and errors, by name.
         incidents: counts up with each change of the incidents on record.
+        rooms, zones, known: of the house's files.
+        house: counts up with each change of those files.
+        calls: of each sensor, the newest last.
+        devices: that were heard lately: lidar, base, camera.
     """
 
     guard: GuardNow | None = None
@@ -97,6 +123,12 @@ class HouseState:
     sensors: tuple[SensorNow, ...] = ()
     problems: Mapping[str, Problem] = field(default_factory=dict)
     incidents: int = 0
+    rooms: tuple[RoomMark, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    known: tuple[KnownObject, ...] = ()
+    house: int = 0
+    calls: tuple[Call, ...] = ()
+    devices: frozenset[str] = frozenset()
 
     @property
     def worst_first(self) -> list[Problem]:
@@ -114,16 +146,6 @@ class Box:
     ymax: int
     label: str
     probability: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class RoomMark:
-    """A room on the map: number, name, the point to look from [m]."""
-
-    id: int
-    name: str
-    x: float
-    y: float
 
 
 @dataclass(frozen=True, kw_only=True)

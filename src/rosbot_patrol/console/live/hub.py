@@ -12,6 +12,7 @@ from typing import Any
 
 from rosbot_patrol.console.live.house_state import HouseState, RoomMark, Scene
 from rosbot_patrol.console.live.map_picture import MapPicture
+from rosbot_patrol.grid import Grid
 
 CAMERA, MAP = "camera", "map"
 
@@ -21,6 +22,7 @@ class Hub:
 
     Attributes:
         version: counts up with each change of the state.
+        map, grid: the newest map as a picture and as cells, None before one was heard.
         on_viewers: called with a subject and the number of its viewers when that changes.
     """
 
@@ -28,8 +30,8 @@ class Hub:
         self._lock = threading.Lock()
         self._state, self._scene = HouseState(), Scene()
         self.version = self.scene_version = 0
-        self.rooms: tuple[RoomMark, ...] = ()
         self.map: MapPicture | None = None
+        self.grid: Grid | None = None
         self._picture, self._picture_number = b"", 0
         self._waiting: set[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = set()
         self._viewers: Counter[str] = Counter()
@@ -39,6 +41,11 @@ class Hub:
     def state(self) -> HouseState:
         """What changes seldom."""
         return self._state
+
+    @property
+    def rooms(self) -> tuple[RoomMark, ...]:
+        """The rooms now."""
+        return self._state.rooms
 
     @property
     def scene(self) -> Scene:

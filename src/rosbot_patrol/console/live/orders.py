@@ -49,6 +49,9 @@ class Robot(Protocol):
     def arm(self, mode: str) -> Answer:
         """Change the mode."""
 
+    def mute(self, room_id: int, seconds: float) -> Answer:
+        """Let the sensors of a room start no mission for a while, 0: let them count again."""
+
     def drive_to(self, x: float, y: float) -> Answer:
         """Drive to a place in map [m]."""
 
@@ -107,6 +110,11 @@ class Desk:
             return self._robot.arm(mode)
 
         return await self._give(visitor, f"change the mode to {mode}", arm)
+
+    async def mute(self, visitor: Visitor, room_id: int, name: str, seconds: float) -> Answer:
+        """Let the sensors of a room start no mission for a while, 0: let them count again."""
+        what = f"mute room {room_id} ({name}) for {seconds:g} s"
+        return await self._give(visitor, what, lambda: self._robot.mute(room_id, seconds))
 
     async def drive_to(self, visitor: Visitor, x: float, y: float) -> Answer:
         """Drive to a place in map [m]."""

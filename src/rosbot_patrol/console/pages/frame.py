@@ -16,6 +16,7 @@ from rosbot_patrol.console.access.gate import peer_of
 from rosbot_patrol.console.live.hub import Hub
 from rosbot_patrol.console.live.orders import Answer, Visitor
 from rosbot_patrol.console.pages.context import Context
+from rosbot_patrol.console.told import told
 from rosbot_patrol.console.words import Words, language_of, words_of
 
 _PERIOD = 0.1  # [s] between two looks for news
@@ -54,6 +55,7 @@ def _pages(_: Words) -> tuple[tuple[str, str, str], ...]:
         ("/", "shield", _("Overview")),
         ("/incidents", "history", _("Incidents")),
         ("/drive", "sports_esports", _("Drive")),
+        ("/house", "house", _("House")),
         ("/health", "monitor_heart", _("Health")),
         ("/settings", "settings", _("Settings")),
     )
@@ -146,7 +148,7 @@ def follow(hub: Hub, refresh: Callable[[], object], *, scene: bool = False) -> N
 
 def say(view: View, answer: Answer) -> None:
     """Show what came of an order."""
-    text = view.words(answer.text)
+    text = told(answer.text, view.words)
     text = f"{text[:1].upper()}{text[1:]}"
     ui.notify(text, type="positive" if answer.accepted else "negative", multi_line=True, position="top")
 

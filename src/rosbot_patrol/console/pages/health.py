@@ -12,8 +12,9 @@ from rosbot_patrol.alerts.dispatch.status_file import PostStatus, read_status
 from rosbot_patrol.console.live.house_state import BatteryNow, SensorNow
 from rosbot_patrol.console.pages.context import Context
 from rosbot_patrol.console.pages.frame import View, follow, frame
-from rosbot_patrol.console.sentences import ago
+from rosbot_patrol.console.sentences import ago, day_line
 
+_SHOWN = 60  # entries of the last day
 _SLOW = 5.0  # [s] between two looks at disk and channels
 
 
@@ -23,9 +24,12 @@ def health_page(context: Context, request: Request) -> None:
         with ui.column().classes("gap-3"):
             _problems(context, view)
             _machine(context, view)
+            if view.account.role.may_manage:
+                _report(context, view)
         with ui.column().classes("gap-3"):
             _sensors(context, view)
             if view.account.role.may_order:
+                _day(context, view)
                 _last_orders(context, view)
 
 
@@ -137,6 +141,38 @@ def _draw_sensor(sensor: SensorNow, view: View) -> None:
             ui.label(sensor.name)
             moved = _("motion: {when}").format(when=ago(sensor.motion, _))
             ui.label(f"{moved}{'' if is_well else f' · {sensor.text}'}").classes("text-sm opacity-80")
+
+
+def _report(context: Context, view: View) -> None:
+    _ = view.words
+    with ui.card().classes("w-full"):
+        _heading(_("Something is wrong?"))
+        ui.label(_("A file for the developers: logs and settings, without passwords, addresses and pictures."))
+        ui.button(_("Bug report"), icon="bug_report", on_click=lambda: ui.navigate.to("/report.zip")).props(
+            "outline no-caps"
+        )
+
+
+def _day(context: Context, view: View) -> None:
+    _ = view.words
+    with ui.card().classes("w-full"):
+        _heading(_("The last day"))
+        box = ui.element("ol").classes("console-timeline")
+
+    def refresh() -> None:
+        entries = context.day_log.newest_first[:_SHOWN]
+        box.clear()
+        with box:
+            if not entries:
+                ui.label(_("Nothing has happened."))
+            for entry in entries:
+                icon, text = day_line(entry, _)
+                with ui.element("li"):
+                    ui.icon(icon, size="20px").props('aria-hidden="true"')
+                    ui.label(view.time(entry.wall, "HH:mm")).classes("opacity-80 text-sm")
+                    ui.label(text)
+
+    follow(context.hub, refresh)
 
 
 def _last_orders(context: Context, view: View) -> None:

@@ -123,12 +123,29 @@ def _attention(context: Context, view: View) -> None:
                     ui.label(problem.text)
             if len(found) > 4:
                 ui.link(_("{n} more").format(n=len(found) - 4), "/health")
+            for room, until in state.arming.muted if state.arming is not None else ():
+                _draw_muted(context, view, room, until)
             if context.door.accounts.is_open:
                 with ui.row().classes("console-problem console-note no-wrap items-center w-full"):
                     ui.icon("key", size="22px").props('aria-hidden="true"')
                     ui.link(_("Set a password to use this page from your phone."), "/settings")
 
     follow(context.hub, refresh)
+
+
+def _draw_muted(context: Context, view: View, room: int, until: float) -> None:
+    _ = view.words
+    name = next((each.name for each in context.hub.rooms if each.id == room), str(room))
+
+    async def end() -> None:
+        say(view, await context.desk.mute(view.visitor, room, name, 0.0))
+
+    with ui.row().classes("console-problem console-note no-wrap items-center w-full"):
+        ui.icon("volume_off", size="22px").props('aria-hidden="true"')
+        ui.label(_("{room} is left alone until {time}.").format(room=name, time=view.time(until, "HH:mm")))
+        ui.space()
+        if view.account.role.may_order:
+            ui.button(_("Guard it again"), on_click=end).props("flat dense no-caps")
 
 
 def _orders(context: Context, view: View) -> None:

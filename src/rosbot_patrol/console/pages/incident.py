@@ -9,16 +9,19 @@ from urllib.parse import quote
 from nicegui import ui
 from starlette.requests import Request
 
+from rosbot_patrol.alerts.pictures.clip import CLIP
 from rosbot_patrol.alerts.records.incident import Event, Incident
+from rosbot_patrol.console.house import edit
 from rosbot_patrol.console.live.incident_desk import FALSE_ALARM, SEEN, Details, pictures_of
 from rosbot_patrol.console.pages.context import Context
-from rosbot_patrol.console.pages.frame import View, frame, say_problem
+from rosbot_patrol.console.pages.frame import View, frame, say, say_problem
 from rosbot_patrol.console.sentences import origin_text, title_of, verdict_colour, verdict_name
 from rosbot_patrol.errors import AccessError, ParamError, StoreError
 from rosbot_patrol.patrol.intruder.known_objects import KnownObject
 
 _KNOWN_RADIUS = 0.6  # [m] around a false alarm's place within which nothing alarms
 _MOST = 15  # pictures
+_MUTED_H = 4  # [h] that a room is left alone after a false alarm
 _PERIOD = 2.0  # [s] between two looks at a mission that still runs
 _KINDS = {
     "sensor": "sensors",
@@ -85,6 +88,10 @@ class _Page:
         files = pictures_of(self._incident)
         if not files:
             ui.label(_("No picture was kept.")).classes("opacity-70")
+        if any(file.role == "clip" for file in self._incident.files):
+            poster = f' poster="{base}/{quote(files[0].name)}"' if files else ""
+            clip = ui.element("video").props(f'controls playsinline preload="metadata" src="{base}/{CLIP}"{poster}')
+            clip.classes("console-clip").props["aria-label"] = _("The seconds around the sighting")
         with ui.element("div").classes("console-figures"):
             for file in files[:_MOST]:
                 with ui.element("figure").classes("console-figure"):
@@ -118,6 +125,7 @@ class _Page:
         with ui.dialog() as dialog, ui.card().classes("max-w-md"):
             ui.label(_("False alarm")).classes("text-lg")
             known = ui.checkbox(_("Something stands there that looks like a person: do not alarm there again."))
+            mute = ui.checkbox(_("Leave the room alone for {n} hours.").format(n=_MUTED_H))
             known.set_enabled(place is not None)
             if place is None:
                 ui.label(_("Its place is not known, so it cannot be remembered.")).classes("text-sm opacity-80")
@@ -125,20 +133,27 @@ class _Page:
             name.bind_visibility_from(known, "value")
             with ui.row().classes("w-full justify-end"):
                 ui.button(_("Not now"), on_click=lambda: dialog.submit(None)).props("flat no-caps")
-                save = ui.button(_("Save"), on_click=lambda: dialog.submit((known.value, name.value)))
+                save = ui.button(_("Save"), on_click=lambda: dialog.submit((known.value, mute.value, name.value)))
                 save.props("unelevated no-caps").mark("save-false-alarm")
         choice = await dialog
         dialog.delete()
         if choice is None:
             return
-        is_known, called = choice
+        is_known, is_muted, called = choice
         if is_known and place is not None:
             thing = KnownObject(
                 x=round(place[0], 2), y=round(place[1], 2), radius=_KNOWN_RADIUS, name=called or _("a known object")
             )
             if not await self._do(
-                f"know '{thing.name}' at ({thing.x}, {thing.y})", lambda _who: self._context.know(thing)
+                f"know '{thing.name}' at ({thing.x}, {thing.y})",
+                lambda _who: edit.add_object(self._context.house, thing),
             ):
+                return
+        if is_muted:
+            room = self._incident.room_id, self._incident.room_name
+            answer = await self._context.desk.mute(self._view.visitor, *room, _MUTED_H * 3600.0)
+            say(self._view, answer)
+            if not answer.accepted:
                 return
         await self._mark(FALSE_ALARM)
 

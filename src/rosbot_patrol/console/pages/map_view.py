@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Awaitable, Callable, Iterable
 from html import escape
 
 from nicegui import events, ui
@@ -24,6 +25,31 @@ _TAP = """(e) => {
 
 def map_view(context: Context, view: View) -> None:
     """Draw the map."""
+
+    async def tap(x: float, y: float) -> None:
+        if view.account.role.may_order:
+            await _offer(context, view, x, y)
+
+    map_plan(context, view, tap)
+
+
+def map_plan(
+    context: Context,
+    view: View,
+    tap: Callable[[float, float], Awaitable[None]],
+    more: Callable[[MapPicture], str] = lambda _: "",
+) -> Callable[[], None]:
+    """Draw the live map.
+
+    Args:
+        context: of the console.
+        view: of the visitor.
+        tap: told the place in map [m] of each tap.
+        more: SVG drawn over it, in the map's pixels.
+
+    Returns:
+        Draws it anew.
+    """
     _ = view.words
     hub = context.hub
     hub.look(MAP, 1)
@@ -44,16 +70,18 @@ def map_view(context: Context, view: View) -> None:
         if found.number != shown:
             shown = found.number
             picture.props(f'src="/map.png?{found.number}"')
-        over.content = _drawn(context, found)
+        over.content = _drawn(context, found, more(found))
 
-    async def tap(event: events.GenericEventArguments) -> None:
+    async def on_tap(event: events.GenericEventArguments) -> None:
         found = hub.map
-        if found is not None and view.account.role.may_order:
-            x, y = found.place(float(event.args["x"]) * found.width, float(event.args["y"]) * found.height)
-            await _offer(context, view, x, y)
+        if found is not None:
+            place = found.place(float(event.args["x"]) * found.width, float(event.args["y"]) * found.height)
+            await tap(float(place[0]), float(place[1]))
 
-    plan.on("click", tap, js_handler=_TAP)
+    plan.on("click", on_tap, js_handler=_TAP)
+    follow(hub, refresh)
     follow(hub, refresh, scene=True)
+    return refresh
 
 
 async def _offer(context: Context, view: View, x: float, y: float) -> None:
@@ -75,13 +103,17 @@ async def _offer(context: Context, view: View, x: float, y: float) -> None:
         say(view, await context.desk.drive_to(view.visitor, x, y))
 
 
-def _drawn(context: Context, found: MapPicture) -> str:
+def _drawn(context: Context, found: MapPicture, more: str) -> str:
     """The overlay as SVG, in the map's pixels."""
-    scene, guard = context.hub.scene, context.hub.state.guard
+    state, scene, guard = context.hub.state, context.hub.scene, context.hub.state.guard
     unit = 0.1 / found.resolution  # pixels of 10 cm
-    parts = []
+    parts = [f'<polygon points="{points_text(zone.points, found)}" class="zone"/>' for zone in state.zones]
+    for thing in state.known:
+        column, row = found.pixel(thing.x, thing.y)
+        radius = thing.radius / found.resolution
+        parts.append(f'<circle cx="{column:.0f}" cy="{row:.0f}" r="{radius:.0f}" class="known"/>')
     if scene.path:
-        points = " ".join(f"{column:.0f},{row:.0f}" for column, row in (found.pixel(*place) for place in scene.path))
+        points = points_text(scene.path, found)
         parts.append(f'<polyline points="{points}" class="way" stroke-width="{unit:.1f}"/>')
     goal = guard.room_id if guard is not None and guard.doing in ("driving", "looking") else None
     parts += [_room(room, found, unit, is_goal=room.id == goal) for room in context.hub.rooms]
@@ -93,7 +125,12 @@ def _drawn(context: Context, found: MapPicture) -> str:
         column, row = found.pixel(x, y)
         turn = f"translate({column:.1f} {row:.1f}) rotate({-math.degrees(yaw):.1f}) scale({unit:.2f})"
         parts.append(f'<path d="M 3.2 0 L -2 2.2 L -1.1 0 L -2 -2.2 Z" transform="{turn}" class="robot"/>')
-    return f'<svg viewBox="0 0 {found.width} {found.height}" aria-hidden="true">{"".join(parts)}</svg>'
+    return f'<svg viewBox="0 0 {found.width} {found.height}" aria-hidden="true">{"".join(parts)}{more}</svg>'
+
+
+def points_text(places: Iterable[tuple[float, float]], found: MapPicture) -> str:
+    """Places in map [m] as SVG has points."""
+    return " ".join(f"{column:.0f},{row:.0f}" for column, row in (found.pixel(*place) for place in places))
 
 
 def _room(room: RoomMark, found: MapPicture, unit: float, *, is_goal: bool) -> str:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
+import nicegui
 from fastapi import FastAPI
 from nicegui import ui
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp
 
 from rosbot_patrol.alerts.records.incident import is_name
@@ -19,17 +21,22 @@ from rosbot_patrol.console.access.gate import Gate
 from rosbot_patrol.console.access.sign_in import SignIn
 from rosbot_patrol.console.pages.context import Context
 from rosbot_patrol.console.pages.drive import drive_page
+from rosbot_patrol.console.pages.guide import guide_page
 from rosbot_patrol.console.pages.health import health_page
 from rosbot_patrol.console.pages.home import home_page
+from rosbot_patrol.console.pages.house.page import house_page
 from rosbot_patrol.console.pages.incident import incident_page
 from rosbot_patrol.console.pages.incident_list import incidents_page
 from rosbot_patrol.console.pages.settings import settings_page
 from rosbot_patrol.console.web.camera import CameraStream
 from rosbot_patrol.console.web.icons import SHIELD, icon
+from rosbot_patrol.console.web.part import part_of
 from rosbot_patrol.errors import StoreError
 
+log = logging.getLogger(__name__)
+
 _HERE = Path(__file__).resolve().parent
-_TYPES = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png"}
+_TYPES = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png", ".mp4": "video/mp4"}
 _SIZES = (192, 512)
 _FOREVER = {"Cache-Control": "private, max-age=31536000, immutable"}
 
@@ -47,6 +54,7 @@ def make_app(context: Context, *, is_secure: bool) -> ASGIApp:
     _add_live(app, context)
     _add_incidents(app, context)
     _add_pages(context)
+    nicegui.app.on_exception(_log_defect)
     ui.run_with(
         app,
         title="rosbot_patrol",
@@ -56,6 +64,11 @@ def make_app(context: Context, *, is_secure: bool) -> ASGIApp:
         reconnect_timeout=10.0,
     )
     return Gate(app, context.door)
+
+
+def _log_defect(err: Exception) -> None:
+    """A defect of a page costs that page one answer; the log names it."""
+    log.error("a page of the console failed: %s", err, exc_info=err)
 
 
 def _add_sign_in(app: FastAPI, sign_in: SignIn) -> None:
@@ -107,11 +120,25 @@ def _add_live(app: FastAPI, context: Context) -> None:
 
 def _add_incidents(app: FastAPI, context: Context) -> None:
     @app.get("/incidents/{incident_id}/files/{name}")
-    async def get_file(incident_id: str, name: str) -> Response:
+    async def get_file(request: Request, incident_id: str, name: str) -> Response:
         kind = _TYPES.get(Path(name).suffix.lower())
         if kind is None or not is_name(incident_id) or not is_name(name):
             return _missing()
-        return await _stored(lambda: context.incidents.file(incident_id, name), kind, _FOREVER)
+        found = await _stored(lambda: context.incidents.file(incident_id, name), kind, _FOREVER)
+        return part_of(found, request.headers.get("range", ""), _FOREVER) if kind.startswith("video") else found
+
+    @app.get("/report.zip")
+    async def get_report(request: Request) -> Response:
+        account: Account = request.state.account
+        if not account.role.may_manage:
+            return PlainTextResponse("Only owners make a report.", 403)
+        attached = {"Content-Disposition": 'attachment; filename="rosbot_patrol-report.zip"'}
+        return Response(await asyncio.to_thread(context.report), media_type="application/zip", headers=attached)
+
+    @app.post("/seen/{incident_id}/{token}")
+    async def mark_seen(incident_id: str, token: str) -> Response:
+        status, text = await context.seen.take(incident_id, token)
+        return PlainTextResponse(text, status)
 
     @app.get("/incidents/{incident_id}/export.zip")
     async def get_export(incident_id: str) -> Response:
@@ -135,8 +162,18 @@ def _missing() -> Response:
 
 def _add_pages(context: Context) -> None:
     @ui.page("/")
-    def get_home(request: Request) -> None:
+    def get_home(request: Request) -> Response | None:
+        if context.guide is not None:
+            return RedirectResponse("/guide")
         home_page(context, request)
+        return None
+
+    @ui.page("/guide")
+    def get_guide(request: Request) -> Response | None:
+        if context.guide is None:
+            return RedirectResponse("/")
+        guide_page(context, request)
+        return None
 
     @ui.page("/incidents")
     def get_incidents(request: Request) -> None:
@@ -149,6 +186,10 @@ def _add_pages(context: Context) -> None:
     @ui.page("/drive")
     def get_drive(request: Request) -> None:
         drive_page(context, request)
+
+    @ui.page("/house")
+    def get_house(request: Request) -> None:
+        house_page(context, request)
 
     @ui.page("/health")
     def get_health(request: Request) -> None:

@@ -11,27 +11,18 @@ incident a false alarm.
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.files import write_atomic
 from rosbot_patrol.patrol.records.inputs import Measured
 from rosbot_patrol.yaml_files import read_mapping
 
 FOUND_FALSE = "known_objects.yaml"
-
-_HEAD = (
-    "# Things that look like somebody, from false alarms. A line may be changed or removed; the next mission obeys.\n"
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,32 +80,6 @@ def _known(tree: Any, name: str) -> KnownObject:
         raise ParamError(name, f"is {tree!r}, expected name, x, y, and maybe radius and label")
     entry = params.load(_Entry, tree, name=name)
     return KnownObject(x=entry.x, y=entry.y, radius=entry.radius, name=entry.name.strip(), label=entry.label)
-
-
-def add_known(path: Path, thing: KnownObject) -> None:
-    """Add an object to a file, which is made where it is missing; comments stay.
-
-    Raises:
-        ParamError: the file, or the object, is wrong; the file is as it was.
-        OSError: the disk does not take it.
-    """
-    before = path.read_text("utf-8") if path.exists() else f"{_HEAD}objects:\n"
-    if path.exists():
-        load_known(path)
-    tree = {"name": thing.name, "x": thing.x, "y": thing.y, "radius": thing.radius}
-    if thing.label:
-        tree["label"] = thing.label
-    _known(tree, "the object: ")
-    editor = YAML()
-    editor.width = 200
-    content = editor.load(before) or {}
-    content["objects"] = content.get("objects") or CommentedSeq()
-    line = CommentedMap(tree)
-    line.fa.set_flow_style()
-    content["objects"].append(line)
-    written = io.StringIO()
-    editor.dump(content, written)
-    write_atomic(path, written.getvalue().encode())
 
 
 class KnownObjects:

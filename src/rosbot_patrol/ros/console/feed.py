@@ -14,13 +14,14 @@ from sensor_msgs.msg import BatteryState, CompressedImage
 from std_msgs.msg import Bool, Empty
 from visualization_msgs.msg import Marker, MarkerArray
 
-from rosbot_patrol.console.live.house_state import Box, Problem, RoomMark
+from rosbot_patrol.console.house.files import HouseFiles
+from rosbot_patrol.console.live.day_log import DayLog
+from rosbot_patrol.console.live.house_state import Box, Call, Problem, RoomMark
 from rosbot_patrol.console.live.hub import CAMERA, MAP, Hub
 from rosbot_patrol.console.live.map_picture import draw_map
 from rosbot_patrol.errors import MapError, ParamError, TransformError
-from rosbot_patrol.msg import Alert, PatrolState, SensorStates
+from rosbot_patrol.msg import Alert, EspTrigger, PatrolState, SensorStates
 from rosbot_patrol.msg import Arming as ArmingMsg
-from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.ros.console.records import arming_from_msg, battery_from_msg, guard_from_msg, sensor_from_msg
 from rosbot_patrol.ros.messages.convert import grid_from_msg
 from rosbot_patrol.ros.messages.fast_arrays import GridMsg
@@ -34,6 +35,8 @@ _ALIVE_FOR = 4.0  # [s] after its last sign of life the patrol counts as gone
 _PROBLEM_FOR = 15.0  # [s] after which a problem that nobody repeats is over
 _TICK = 0.2  # [s]
 _MAP_RETRY = 2.0  # [s]
+_CALLS = 100  # sensors
+_DEVICES = {"scan": "lidar", "odom": "base", "camera/rgb/camera_info": "camera"}
 _POINTS = 120  # of a path that is drawn
 _SHOWN_FOR = 1.5  # [s] for which boxes are shown
 _PLAN_PARAMS = ("move_base/base_global_planner",)
@@ -45,11 +48,14 @@ class Feed:
 
     Args:
         hub: of the pages.
-        points: points file with the rooms.
+        house: files of the house.
+        day_log: notes what changes; None: nobody does.
     """
 
-    def __init__(self, hub: Hub, points: str) -> None:
-        self._hub, self._points = hub, points
+    def __init__(self, hub: Hub, house: HouseFiles, day_log: DayLog | None = None) -> None:
+        self._hub, self._house, self._day_log = hub, house, day_log
+        self._house_marks: object = None
+        self._devices: dict[str, float] = {}
         self._lock = threading.Lock()
         self._problems: dict[str, tuple[Problem, float]] = {}
         self._alive = self._boxes_at = float("-inf")
@@ -57,18 +63,24 @@ class Feed:
         self._transforms: Transforms | None = None
         self._viewers: dict[str, int] = {}
         self._optional: dict[str, list[rospy.Subscriber]] = {}
-        self._load_rooms()
+        self.follow_house()
         self._subscribe()
         hub.on_viewers = self._viewers.__setitem__  # the pages' thread does not wait for the master
         Worker(self._run, name="feed").start()
 
-    def _load_rooms(self) -> None:
-        try:
-            rooms = load_rooms(self._points)
-        except ParamError as err:
-            log.error("%s; the console shows no rooms", err)
+    def follow_house(self) -> None:
+        """Read the house's files anew if they have changed; of wrong ones what was read before stays."""
+        marks = self._house.marks
+        if marks == self._house_marks:
             return
-        self._hub.rooms = tuple(RoomMark(id=room.id, name=room.name, x=room.pose.x, y=room.pose.y) for room in rooms)
+        self._house_marks = marks
+        try:
+            rooms, zones, known = self._house.rooms or (), self._house.zones, self._house.known
+        except ParamError as err:
+            log.error("%s; the pages show what was read before", err)
+            return
+        marked = tuple(RoomMark(id=room.id, name=room.name, x=room.pose.x, y=room.pose.y) for room in rooms)
+        self._hub.change(rooms=marked, zones=zones, known=known, house=self._hub.state.house + 1)
 
     def _subscribe(self) -> None:
         hub = self._hub
@@ -79,14 +91,33 @@ class Feed:
         rospy.Subscriber("e_stop", Bool, lambda m: hub.change(is_stopped=bool(m.data)), queue_size=5)
         rospy.Subscriber("battery", BatteryState, lambda m: hub.change(battery=battery_from_msg(m)), queue_size=1)
         rospy.Subscriber("sensors/states", SensorStates, self._on_sensors, queue_size=2)
+        rospy.Subscriber("motion_trigger", EspTrigger, self._on_motion, queue_size=100)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=50)
         rospy.Subscriber("map", GridMsg, lambda m: self._maps.set(m, now()), queue_size=1, buff_size=1 << 24)
+
+    def watch_devices(self) -> None:
+        """Note which of the robot's devices are heard, as the set-up guide shows."""
+        for topic, name in _DEVICES.items():
+
+            def hear(_message: object, name: str = name) -> None:
+                self._devices[name] = time.monotonic()
+
+            rospy.Subscriber(topic, rospy.AnyMsg, hear, queue_size=1)
 
     # -- seldom
 
     def _on_alive(self, _message: Empty) -> None:
         self._alive = time.monotonic()
         self._hub.change(is_heard=True)
+
+    def _on_motion(self, message: EspTrigger) -> None:
+        """Note that a sensor reports motion, at most once a second."""
+        before = self._hub.state.calls
+        last = next((call.at for call in before if call.sensor == message.id), float("-inf"))
+        at = time.monotonic()
+        if message.move and at - last >= 1.0:
+            others = tuple(call for call in before if call.sensor != message.id)
+            self._hub.change(calls=(*others[-_CALLS:], Call(sensor=message.id, at=at)))
 
     def _on_sensors(self, message: SensorStates) -> None:
         self._hub.change(sensors=tuple(map(sensor_from_msg, message.sensors)))
@@ -164,6 +195,8 @@ class Feed:
         number, wait = 0, _MAP_RETRY
         while not rospy.is_shutdown():
             time.sleep(_TICK)
+            if self._day_log is not None:
+                self._day_log.follow(self._hub.state)
             self._follow_viewers()
             at = time.monotonic()
             if at - self._alive > _ALIVE_FOR:
@@ -174,6 +207,9 @@ class Feed:
             if wait <= 0.0:
                 wait = _MAP_RETRY
                 self._show_problems(at)
+                self.follow_house()
+                lately = (name for name, heard in self._devices.items() if at - heard < _ALIVE_FOR)
+                self._hub.change(devices=frozenset(lately))
             if (message := self._maps.take()) is not None:
                 number += 1
                 self._draw(message, number)
@@ -182,7 +218,8 @@ class Feed:
 
     def _draw(self, message: OccupancyGrid, number: int) -> None:
         try:
-            self._hub.map = draw_map(grid_from_msg(message, rospy.resolve_name("map")), number)
+            grid = grid_from_msg(message, rospy.resolve_name("map"))
+            self._hub.map, self._hub.grid = draw_map(grid, number), grid
         except MapError as err:
             log.warning("the console shows no map: %s", err)
             return

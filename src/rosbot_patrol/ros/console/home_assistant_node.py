@@ -17,14 +17,17 @@ from pathlib import Path
 
 import rospy
 
+from rosbot_patrol.alerts.channels.config import Surroundings
 from rosbot_patrol.alerts.records.query import Query
 from rosbot_patrol.console.access.accounts import Account, Accounts, Role
-from rosbot_patrol.console.access.door import Door, session_secret
+from rosbot_patrol.console.access.door import Door
 from rosbot_patrol.console.access.order_log import Order, OrderLog
+from rosbot_patrol.console.access.secret import console_secret
 from rosbot_patrol.console.home_assistant.discovery import EVENTS, discovery
 from rosbot_patrol.console.home_assistant.link import BrokerLink
 from rosbot_patrol.console.home_assistant.messages import MqttOrder, order_of, states, status_of
 from rosbot_patrol.console.home_assistant.settings import load_broker
+from rosbot_patrol.console.house.files import Given, HouseFiles
 from rosbot_patrol.console.live.hub import Hub
 from rosbot_patrol.console.live.incident_desk import IncidentDesk
 from rosbot_patrol.console.live.orders import DISARMED, Answer
@@ -33,7 +36,7 @@ from rosbot_patrol.params import param
 from rosbot_patrol.ros.console.feed import Feed
 from rosbot_patrol.ros.console.robot import RosRobot
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
-from rosbot_patrol.ros.runtime.node import load_params, run_node
+from rosbot_patrol.ros.runtime.node import load_params, ros_home, run_node
 from rosbot_patrol.ros.runtime.private_files import use_private_umask
 from rosbot_patrol.ros.runtime.state_folder import state_folder
 
@@ -64,12 +67,13 @@ class HomeAssistantNode:
         self._broker = load_broker(Path(params.mqtt).expanduser(), os.environ)
         folder = state_folder(params.state_dir, rospy.get_namespace())
         self._accounts = Accounts(folder / "console" / "accounts.json")
-        self._door = Door(self._accounts, session_secret(folder / "console" / "secret"), time.monotonic)
+        self._door = Door(self._accounts, console_secret(folder), time.monotonic)
         self._orders = OrderLog(folder / "console" / "orders.jsonl")
         self._incidents = IncidentDesk(folder, time.time)
         self._hub, self._health = Hub(), Health()
         self._robot = RosRobot(self._hub)
-        Feed(self._hub, params.path_to_params)
+        around = Surroundings(home=ros_home(), environ=os.environ)
+        Feed(self._hub, HouseFiles(folder, Given(rooms=params.path_to_params), around))
         self._link = BrokerLink(self._broker, self._on_order)
         self._newest = ""  # id of the last incident that was told
         self._is_first = True

@@ -34,6 +34,7 @@ def arming_from_msg(message: Arming) -> ArmingNow:
         entry_delay=message.entry_delay,
         is_quiet=message.quiet,
         why=message.why,
+        muted=tuple(zip(message.muted, message.muted_until, strict=True)),
     )
 
 

@@ -18,7 +18,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.msg import PatrolAction, PatrolGoal
 from rosbot_patrol.ros.messages.convert import pose_to_msg
 from rosbot_patrol.ros.runtime.node import Worker, now
-from rosbot_patrol.srv import Arm
+from rosbot_patrol.srv import Arm, Mute
 
 log = logging.getLogger(__name__)
 
@@ -76,6 +76,13 @@ class RosRobot:
     def arm(self, mode: str) -> Answer:
         """Change the mode."""
         response = _call("patrol/arm", Arm, mode)
+        if isinstance(response, Answer):
+            return response
+        return Answer(accepted=bool(response.accepted), text=response.message)
+
+    def mute(self, room_id: int, seconds: float) -> Answer:
+        """Let the sensors of a room start no mission for a while, 0: let them count again."""
+        response = _call("patrol/mute", Mute, room_id, seconds)
         if isinstance(response, Answer):
             return response
         return Answer(accepted=bool(response.accepted), text=response.message)

@@ -9,6 +9,7 @@ from pathlib import Path
 FILES = {
     "rosbot_patrol": "The whole guard, simulated or on the robot; `scripts/patrol` takes the same arguments.",
     "demo": "The simulated house with an intruder: what `scripts/patrol` runs.",
+    "new_house": "Set-up of a new house by a guide on the console's page ([console](console.md#a-new-house)).",
     "scenario": "The simulated house with a scenario played in it ([scenarios](scenarios.md)).",
     "rosbot_patrol_pc": "Detector and sensor bridge on a PC (`detector:=pc` on the robot).",
     "simulation_gmapping": "Map a simulated house ([mapping](mapping.md)).",

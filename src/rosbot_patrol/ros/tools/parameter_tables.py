@@ -58,6 +58,7 @@ from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
 from rosbot_patrol.ros.sensors.watch_node import SensorWatchParams
 from rosbot_patrol.ros.simulator.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.simulator.node import SimulatorParams
+from rosbot_patrol.ros.tools.foxglove_node import FoxgloveParams
 from rosbot_patrol.ros.tools.launch_page import launch_page
 from rosbot_patrol.ros.tools.narrator_node import NarratorParams
 from rosbot_patrol.ros.tools.source_tree import with_tree
@@ -138,6 +139,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ("console", [("", ConsoleParams), ("", ServerParams)]),
     ("home_assistant", [("", HomeAssistantParams)]),
     ("narrator", [("", NarratorParams)]),
+    ("foxglove", [("", FoxgloveParams)]),
     ("demo_intruder", [("", DemoParams)]),
 ]
 

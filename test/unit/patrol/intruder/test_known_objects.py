@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.patrol.intruder.known_objects import KnownObject, KnownObjects, add_known, load_known
+from rosbot_patrol.patrol.intruder.known_objects import KnownObject, KnownObjects, load_known
 
 
 def write(folder: Path, text: str) -> Path:
@@ -61,27 +61,12 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
         load_known(tmp_path / "nowhere.yaml")
 
 
-def test_an_object_is_added_and_comments_stay(tmp_path: Path) -> None:
-    path = tmp_path / "known_objects.yaml"
-    add_known(path, KnownObject(x=1.5, y=-2.0, radius=0.6, name="coat stand: mine"))
-    path.write_text(path.read_text("utf-8") + "  # the one in the hall\n", encoding="utf-8")
-    add_known(path, KnownObject(x=3.0, y=4.0, name="statue", label="person"))
-    assert [each.name for each in load_known(path)] == ["coat stand: mine", "statue"]
-    assert "# the one in the hall" in path.read_text("utf-8")
-    with pytest.raises(ParamError, match="name"):
-        add_known(path, KnownObject(x=3.0, y=4.0, name="two\nlines"))
-    path.write_text("objects: 3\n", encoding="utf-8")
-    with pytest.raises(ParamError, match="objects"):
-        add_known(path, KnownObject(x=3.0, y=4.0, name="statue"))
-    assert path.read_text("utf-8") == "objects: 3\n"
-
-
 def test_the_consoles_file_is_read_again_when_it_changes(tmp_path: Path) -> None:
     own, path, said = tmp_path / "own.yaml", tmp_path / "known_objects.yaml", []
     own.write_text("objects:\n  - {name: statue, x: 0, y: 0}\n", encoding="utf-8")
     known = KnownObjects(str(own), path, said.append)
     assert [each.name for each in known()] == ["statue"]
-    add_known(path, KnownObject(x=1.0, y=2.0, name="coat stand"))
+    path.write_text("objects:\n  - {name: coat stand, x: 1.0, y: 2.0}\n", encoding="utf-8")
     assert [each.name for each in known()] == ["statue", "coat stand"]
     path.write_text("objects: nonsense\n", encoding="utf-8")
     assert [each.name for each in known()] == ["statue", "coat stand"]

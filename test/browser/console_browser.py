@@ -86,13 +86,21 @@ class Browser:
         return self.find(f"//button[.//*[normalize-space(text())={quoted}] or @aria-label={quoted}]")
 
     def press(self, name):
-        def pressed():
-            button = self.button(name)
-            self.driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
-            button.click()
+        self._click(lambda: self.button(name), f"the button '{name}'")
+
+    def click(self, xpath):
+        self._click(lambda: self.find(xpath), xpath)
+
+    def _click(self, find, what):
+        """Click on an element; on the one in its place where the page is drawn anew between finding and clicking."""
+
+        def clicked():
+            element = find()
+            self.driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
+            element.click()
             return True
 
-        self.wait(pressed, f"the button '{name}'")
+        self.wait(clicked, what)
 
     def field(self, label):
         return self.find(f'//input[@aria-label="{label}"]')
@@ -101,6 +109,11 @@ class Browser:
         field = self.field(label)
         field.send_keys(Keys.CONTROL, "a")
         field.send_keys(text)
+
+    def choose(self, label, text):
+        """Choose from a list."""
+        self.click(f'//label[contains(@class, "q-select")][.//*[normalize-space(text())="{label}"]]')
+        self.click(f'//*[contains(@class, "q-menu")]//*[normalize-space(text())="{text}"]')
 
     def sign_in(self, name, password):
         for key, value in (("name", name), ("password", password)):

@@ -1,0 +1,1 @@
+"""The page of the house: rooms, zones and objects on the map, motion sensors, times, ways to the owner."""
