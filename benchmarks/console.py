@@ -11,6 +11,9 @@ The console runs as a node before a real master. Debian's chromium is the browse
 - five_viewers_cpu_percent: share of one core while five clients take the camera's stream; pictures of 640 x 480 and
   50 kB come ten times a second.
 - idle_cpu_percent: the same while nobody looks, and the pictures still come. mb: memory after all of that.
+- mqtt_order_s: from an order at a real mosquitto until the alarm panel's new state is there; median of twenty.
+- seen_to_phone_s: from a notice with a picture that is given to the post until a local server of ntfy's protocol has
+  it, with the outbox on the disk between; median of ten.
 - incidents_100k_ms: a list of the newest 24 of 100,000 incidents, with pictures and marks; median.
 """
 
@@ -36,6 +39,7 @@ from pathlib import Path
 from drivers import jpeg, share_of
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path += [str(ROOT / "test" / "process" / name) for name in ("console", "alerts")]  # broker and server of the tests
 PHONE = (390, 844)
 FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage")
 HEADLINE = """
@@ -162,6 +166,73 @@ def live(folder: Path, seconds: float) -> dict[str, float]:
     return figures
 
 
+def mqtt_order(folder: Path) -> float:
+    """Time from an order by MQTT to the state [s]."""
+    import rospy
+    from mosquitto_broker import Listener, Mosquitto
+    from rosbot_patrol.msg import Arming
+    from rosbot_patrol.srv import Arm, ArmResponse
+
+    from rosbot_patrol.ros.campaign.house import end_group
+
+    arming = rospy.Publisher("/patrol/arming", Arming, queue_size=1, latch=True)
+    service = rospy.Service(
+        "/patrol/arm", Arm, lambda r: (arming.publish(Arming(mode=r.mode)), ArmResponse(accepted=True))[1]
+    )
+    broker = Mosquitto(folder)
+    listener, times = Listener(broker), []
+    program = Path(os.environ["CMAKE_PREFIX_PATH"].split(":")[0]) / "lib" / "rosbot_patrol" / "home_assistant"
+    arguments = [f"_mqtt:={broker.settings}", f"_state_dir:={folder / 'state'}"]
+    node = subprocess.Popen([sys.executable, str(program), *arguments], start_new_session=True)
+    try:
+        arming.publish(Arming(mode="armed_away"))
+        listener.wait("rosbot_patrol/alarm/state", "armed_away", 40.0)
+        for k in range(20):
+            order, state = ("ARM_HOME", "armed_home") if k % 2 == 0 else ("ARM_AWAY", "armed_away")
+            began = time.monotonic()
+            listener.say("rosbot_patrol/alarm/set", json.dumps({"action": order}))
+            listener.wait("rosbot_patrol/alarm/state", state)
+            times.append(time.monotonic() - began)
+            time.sleep(0.2)
+    finally:
+        end_group(node)
+        listener.stop()
+        broker.stop()
+        service.shutdown()
+        arming.unregister()
+    return statistics.median(times)
+
+
+def seen_to_phone(folder: Path) -> float:
+    """Time from a notice to the phone's service [s]."""
+    from push_server import serving
+
+    from rosbot_patrol.alerts.channels.params import MailParams
+    from rosbot_patrol.alerts.outbox.notice import Notice
+    from rosbot_patrol.ros.post.owner_post import OwnerPost
+    from rosbot_patrol.ros.runtime.diagnostics import Health
+
+    times = []
+    with serving() as server:
+        address = folder / "address"
+        address.write_text(f"ntfy://127.0.0.1:{server.port}/topic\n")
+        address.chmod(0o600)
+        file = folder / "channels.yaml"
+        file.write_text(f"channels:\n  mail:\n    type: apprise\n    url_file: {address}\n    interval: 0\n")
+        post = OwnerPost(MailParams(channels=str(file)), folder / "state", Health())
+        post.start()
+        time.sleep(2.0)
+        for k in range(11):
+            count, began = len(server.requests), time.monotonic()
+            text = {"subject": "Person in hall, 06:00", "text": "Person seen in the hall."}
+            post.put(Notice(id=f"n{k}", wall=time.time(), kind="incident", picture=jpeg(), **text))
+            while len(server.requests) == count:
+                time.sleep(0.002)
+            times.append(time.monotonic() - began)
+            time.sleep(0.5)
+    return statistics.median(times[1:])
+
+
 def incidents(folder: Path) -> dict[str, float]:
     """Time of a page of the list."""
     from alerts_search import COUNT, fill
@@ -194,6 +265,10 @@ def main() -> None:
         master = Master(Path(folder) / "roscore.log")
         try:
             figures = live(Path(folder), options.seconds)
+            for name, measure in (("mqtt_order_s", mqtt_order), ("seen_to_phone_s", seen_to_phone)):
+                own = Path(folder) / name
+                own.mkdir()
+                figures[name] = measure(own)
         finally:
             master.stop()
         if not options.no_incidents:
