@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import io
 import json
 import time
@@ -18,7 +19,7 @@ from rosbot_patrol.console.access.order_log import Order, OrderLog
 from rosbot_patrol.console.live import orders
 from rosbot_patrol.console.live.house_state import GuardNow
 from rosbot_patrol.console.live.hub import CAMERA, Hub
-from rosbot_patrol.console.live.map_picture import draw_map
+from rosbot_patrol.console.live.map_picture import draw_map, draw_seen
 from rosbot_patrol.console.live.orders import Answer, Desk, Visitor
 from rosbot_patrol.grid import Grid, GridInfo
 
@@ -206,3 +207,15 @@ def test_a_disk_that_takes_nothing_refuses_no_order(tmp_path: Path) -> None:
     log = OrderLog(tmp_path / "console" / "orders.jsonl")
     log.add(Order(wall=1.0, who="Ada", peer="::1", what="stop", accepted=True, answer="done"))
     assert len(log.newest) == 1
+
+
+def test_the_seen_floor_is_a_picture_with_its_place() -> None:
+    cells = np.full((10, 20), -1, np.int8)
+    grid = Grid(GridInfo(resolution=0.1, width=20, height=10, origin_x=-1.0, origin_y=2.0), cells)
+    assert draw_seen(grid) is None
+    cells[2:5, 4:8] = 100
+    seen = draw_seen(grid)
+    assert seen is not None
+    assert (seen.left, seen.right, seen.bottom, seen.top) == pytest.approx((-0.6, -0.2, 2.2, 2.5))
+    picture = Image.open(io.BytesIO(base64.b64decode(seen.png)))
+    assert picture.size == (4, 3)

@@ -149,6 +149,17 @@ class Box:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SeenFloor:
+    """Floor that was seen: a picture (PNG in base64) and the corners of its place in map [m]."""
+
+    png: str
+    left: float
+    bottom: float
+    right: float
+    top: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Scene:
     """What moves, while somebody looks.
 
@@ -156,6 +167,7 @@ class Scene:
         robot: x [m], y [m], yaw [rad] in map.
         path: of the robot to its goal [m].
         people: places of persons in this mission [m].
+        seen: floor that was seen in this mission, None for none.
         boxes: of the newest picture that the detector looked at.
         picture_size: columns and rows of that picture.
     """
@@ -163,5 +175,6 @@ class Scene:
     robot: tuple[float, float, float] | None = None
     path: tuple[Point, ...] = ()
     people: tuple[Point, ...] = ()
+    seen: SeenFloor | None = None
     boxes: tuple[Box, ...] = ()
     picture_size: tuple[int, int] = (640, 480)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 from dataclasses import dataclass
 
@@ -9,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from rosbot_patrol.console.live.house_state import SeenFloor
 from rosbot_patrol.grid import Grid
 
 _MARGIN = 0.5  # [m] around what is known
 _FREE, _WALL, _UNKNOWN = (244, 246, 248, 255), (52, 60, 72, 255), (0, 0, 0, 0)
+_SEEN = (46, 125, 50, 70)
 _LARGEST = 4000  # [px] of the picture's longer side
 
 
@@ -43,6 +46,27 @@ class MapPicture:
     def place(self, column: float, row: float) -> tuple[float, float]:
         """Place in map [m] of a column and row."""
         return self.left + column * self.resolution, self.top - row * self.resolution
+
+
+def draw_seen(grid: Grid) -> SeenFloor | None:
+    """Draw the floor that was seen, the cells above 0; None for none."""
+    rows, columns = np.nonzero(grid.cells > 0)
+    if len(rows) == 0:
+        return None
+    first, last, left, right = rows.min(), rows.max() + 1, columns.min(), columns.max() + 1
+    part = grid.cells[first:last, left:right][::-1] > 0
+    colours = np.zeros((*part.shape, 4), np.uint8)
+    colours[part] = _SEEN
+    written = io.BytesIO()
+    Image.fromarray(colours, "RGBA").save(written, "PNG")
+    x, y, edge = grid.info.origin_x, grid.info.origin_y, grid.info.resolution
+    return SeenFloor(
+        png=base64.b64encode(written.getvalue()).decode("ascii"),
+        left=x + float(left) * edge,
+        bottom=y + float(first) * edge,
+        right=x + float(right) * edge,
+        top=y + float(last) * edge,
+    )
 
 
 def draw_map(grid: Grid, number: int) -> MapPicture:

@@ -8,7 +8,7 @@ from html import escape
 
 from nicegui import events, ui
 
-from rosbot_patrol.console.live.house_state import RoomMark
+from rosbot_patrol.console.live.house_state import RoomMark, SeenFloor
 from rosbot_patrol.console.live.hub import MAP
 from rosbot_patrol.console.live.map_picture import MapPicture
 from rosbot_patrol.console.pages.context import Context
@@ -107,7 +107,8 @@ def _drawn(context: Context, found: MapPicture, more: str) -> str:
     """The overlay as SVG, in the map's pixels."""
     state, scene, guard = context.hub.state, context.hub.scene, context.hub.state.guard
     unit = 0.1 / found.resolution  # pixels of 10 cm
-    parts = [f'<polygon points="{points_text(zone.points, found)}" class="zone"/>' for zone in state.zones]
+    parts = [_seen(scene.seen, found)] if scene.seen is not None else []
+    parts += [f'<polygon points="{points_text(zone.points, found)}" class="zone"/>' for zone in state.zones]
     for thing in state.known:
         column, row = found.pixel(thing.x, thing.y)
         radius = thing.radius / found.resolution
@@ -126,6 +127,14 @@ def _drawn(context: Context, found: MapPicture, more: str) -> str:
         turn = f"translate({column:.1f} {row:.1f}) rotate({-math.degrees(yaw):.1f}) scale({unit:.2f})"
         parts.append(f'<path d="M 3.2 0 L -2 2.2 L -1.1 0 L -2 -2.2 Z" transform="{turn}" class="robot"/>')
     return f'<svg viewBox="0 0 {found.width} {found.height}" aria-hidden="true">{"".join(parts)}{more}</svg>'
+
+
+def _seen(seen: SeenFloor, found: MapPicture) -> str:
+    (left, top), (right, bottom) = found.pixel(seen.left, seen.top), found.pixel(seen.right, seen.bottom)
+    return (
+        f'<image href="data:image/png;base64,{seen.png}" x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" '
+        f'height="{bottom - top:.1f}" preserveAspectRatio="none" class="seen"/>'
+    )
 
 
 def points_text(places: Iterable[tuple[float, float]], found: MapPicture) -> str:

@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from rosbot_patrol.geometry import Pose2D, angle_difference, wrap_angle
+from rosbot_patrol.grid import GridInfo
 from rosbot_patrol.patrol.belief.belief import Belief
 from rosbot_patrol.patrol.belief.hypothesis import Hypothesis
 from rosbot_patrol.patrol.belief.second_look import best_second_look
+from rosbot_patrol.patrol.house.floor import Mask
 from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion, LidarTrack
 from rosbot_patrol.patrol.records.inputs import Inputs
@@ -117,6 +119,13 @@ class RoomSearch:
         if search is None or search.survey is None or not search.survey.coverage.area or not search.has_eye:
             return None
         return max(search.survey.coverage.share, search.seen_before)
+
+    def seen_floor(self) -> tuple[GridInfo, Mask] | None:
+        """The floor's grid and the part of the room that was seen, None without a map of it or a camera."""
+        search = self._started
+        if self._ground is None or search is None or search.survey is None or not search.has_eye:
+            return None
+        return self._ground.house.floor.info, search.survey.coverage.seen()
 
     def blind(self) -> str:
         """Reason why the room cannot be called clear, "" if it can."""

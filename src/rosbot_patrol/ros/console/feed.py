@@ -18,7 +18,7 @@ from rosbot_patrol.console.house.files import HouseFiles
 from rosbot_patrol.console.live.day_log import DayLog
 from rosbot_patrol.console.live.house_state import Box, Call, Problem, RoomMark
 from rosbot_patrol.console.live.hub import CAMERA, MAP, Hub
-from rosbot_patrol.console.live.map_picture import draw_map
+from rosbot_patrol.console.live.map_picture import draw_map, draw_seen
 from rosbot_patrol.errors import MapError, ParamError, TransformError
 from rosbot_patrol.msg import Alert, EspTrigger, PatrolState, SensorStates
 from rosbot_patrol.msg import Arming as ArmingMsg
@@ -168,6 +168,7 @@ class Feed:
         return [
             rospy.Subscriber(f"move_base/{name}/plan", Path, self._on_path, queue_size=1),
             rospy.Subscriber("patrol/people", MarkerArray, self._on_people, queue_size=2),
+            rospy.Subscriber("patrol/seen", OccupancyGrid, self._on_seen, queue_size=1),
         ]
 
     def _on_boxes(self, message: BoundingBoxes) -> None:
@@ -182,6 +183,15 @@ class Feed:
         step = max(len(message.poses) // _POINTS, 1)
         places = [(pose.pose.position.x, pose.pose.position.y) for pose in message.poses[::step]]
         self._hub.move(path=tuple((round(x, 2), round(y, 2)) for x, y in places))
+
+    def _on_seen(self, message: OccupancyGrid) -> None:
+        if not message.data:
+            self._hub.move(seen=None)
+            return
+        try:
+            self._hub.move(seen=draw_seen(grid_from_msg(message, "patrol/seen")))
+        except MapError as err:
+            log.warning("the seen floor is not shown: %s", err)
 
     def _on_people(self, message: MarkerArray) -> None:
         spots = [

@@ -37,7 +37,7 @@ class Reporter:
     Args:
         hub: what the pages know.
         house: files of the house.
-        accounts: whose names are taken out.
+        accounts: of the people; their names are left out.
         day_log: of the last day.
     """
 
@@ -85,7 +85,7 @@ def _versions() -> str:
 
 
 def _parameters() -> str:
-    # not by rospy, whose cache knows only those that it was asked for
+    # not by rospy: its cache knows only those that it was asked for
     return str(yaml.safe_dump(rosgraph.Master(rospy.get_name()).getParam("/"), allow_unicode=True))
 
 

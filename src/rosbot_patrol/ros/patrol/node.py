@@ -63,7 +63,7 @@ from rosbot_patrol.ros.patrol.inputs import PatrolInputs
 from rosbot_patrol.ros.patrol.missed_calls import MissedCalls
 from rosbot_patrol.ros.patrol.move_base import MoveBase
 from rosbot_patrol.ros.patrol.orders import ArmingDesk, Orders, StopSwitch
-from rosbot_patrol.ros.patrol.outputs import PeopleMarkers, Pulse, StatePublisher, Wheels
+from rosbot_patrol.ros.patrol.outputs import PeopleMarkers, Pulse, SeenPublisher, StatePublisher, Wheels
 from rosbot_patrol.ros.patrol.pictures import PictureRing
 from rosbot_patrol.ros.patrol.sensor_watch_alive import Neighbour
 from rosbot_patrol.ros.patrol.settings import (
@@ -130,7 +130,7 @@ class PatrolNode:
         rounds, zone = load_or_say(load_schedule, self.params.schedule, rooms, NO_ROUNDS, self.health)
         self.schedule = Schedule(rounds, zone, self.store.schedule)
         params = load_manager_params(self.params, tree, rospy.get_name() + "/")
-        views = RoomSearch(self.params)
+        self._views = views = RoomSearch(self.params)
         self.manager = PatrolManager(
             rooms,
             params,
@@ -161,6 +161,7 @@ class PatrolNode:
         self._schedule_changed = False
         self.move_base = MoveBase(inputs.map_frame)
         self._wheels, self._state, self._pulse = Wheels(), StatePublisher(self.health), Pulse()
+        self._seen = SeenPublisher(inputs.map_frame)
         stop = EmergencyStop(folder / "stop.json")
         self._stop_switch = StopSwitch(stop, self.move_base, self._wheels.publisher, self.desk.write_later)
         kept = folder / "arming.json"
@@ -306,6 +307,7 @@ class PatrolNode:
         self.desk.follow(commands)
         self._record(time_now, commands, inputs.pose)
         self._show_people(time_now, commands)
+        self._seen.step(time_now, lambda: self._views.seen_floor() if self.manager.mission is not None else None)
         if self.manager.mission is not None or self.keeper.needs_pictures:
             self.pictures.start()
         elif self.desk.is_recorded:

@@ -8,15 +8,19 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
+import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Twist
+from nav_msgs.msg import OccupancyGrid
 from std_msgs.msg import ColorRGBA, Empty
 from visualization_msgs.msg import Marker, MarkerArray
 
 from rosbot_patrol.geometry import STOP, Twist2D
+from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.msg import PatrolState
+from rosbot_patrol.patrol.house.floor import Mask
 from rosbot_patrol.patrol.records.commands import Report
 from rosbot_patrol.patrol.records.findings import Person
 from rosbot_patrol.patrol.records.mission import Mission, Phase
@@ -24,6 +28,8 @@ from rosbot_patrol.ros.messages import convert
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 
 log = logging.getLogger(__name__)
+
+_SEEN_PERIOD = 0.5  # [s] between two messages of what was seen
 
 
 class Wheels:
@@ -106,6 +112,38 @@ class StatePublisher:
         self._publisher.publish(message)
         level = OK if report.phase is not Phase.STARTING else WARN
         self._health.set("", level, f"{report.phase.value}: {report.why}")
+
+
+class SeenPublisher:
+    """Publisher of /patrol/seen: the floor that was seen in this mission, while somebody listens.
+
+    Args:
+        frame: frame of the map.
+    """
+
+    def __init__(self, frame: str) -> None:
+        self._frame, self._at, self._is_empty = frame, -math.inf, True
+        self._publisher = rospy.Publisher("patrol/seen", OccupancyGrid, queue_size=1)
+
+    def step(self, time_now: float, find: Callable[[], tuple[GridInfo, Mask] | None]) -> None:
+        """Publish if it is due; call in each step.
+
+        Args:
+            time_now: ROS time [s].
+            find: gives the floor's grid and what was seen of it, None for nothing.
+        """
+        if 0.0 <= time_now - self._at < _SEEN_PERIOD or not self._publisher.get_num_connections():
+            return
+        self._at, found = time_now, find()
+        if found is None:
+            if not self._is_empty:
+                self._publisher.publish(OccupancyGrid())
+            self._is_empty = True
+            return
+        self._is_empty = False
+        info, seen = found
+        grid = Grid(info, np.where(seen, 100, -1).astype(np.int8))
+        self._publisher.publish(convert.grid_to_msg(grid, self._frame, time_now))
 
 
 PEOPLE_TOPIC = "patrol/people"
