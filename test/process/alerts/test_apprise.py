@@ -61,6 +61,22 @@ def test_ntfy_opens_the_page_and_has_a_button_that_marks_it_as_seen() -> None:
     assert links["link"] in said
 
 
+def test_mail_by_apprise_reaches_a_server_of_mail() -> None:
+    pytest.importorskip("aiosmtpd.smtp", reason="needs python3-aiosmtpd")
+    from real_smtp import RealSmtp
+
+    server = RealSmtp()
+    try:
+        url = f"mailto://127.0.0.1:{server.port}?from=robot@example.org&to=owner@example.org&mode=insecure"
+        AppriseTransport(url, "push", 5.0).send(replace(NOTICE, link="http://robot.local:8420/incidents/1"))
+    finally:
+        server.stop()
+    ((_, to, data, _),) = server.mails
+    assert to == ["owner@example.org"]
+    assert b"Person in corridor hall" in data
+    assert b"http://robot.local:8420/incidents/1" in data
+
+
 def test_a_json_service_gets_it_and_a_notice_without_a_picture() -> None:
     with serving() as server:
         transport = AppriseTransport(f"json://127.0.0.1:{server.port}/hook/{TOPIC}", "push", 5.0, with_picture=False)

@@ -18,7 +18,19 @@ from rosbot_patrol.console.access.gate import Gate
 from rosbot_patrol.console.access.sign_in import SignIn
 
 PASSWORD = "correct horse"
-PATHS = ("/", "/incidents", "/camera.mjpg", "/map.png", "/incidents/x/files/y.jpg", "/_nicegui/any", "/sign-in/..")
+PATHS = (
+    "/",
+    "/incidents",
+    "/camera.mjpg",
+    "/map.png",
+    "/incidents/x/files/y.jpg",
+    "/incidents/x/files/clip.mp4",
+    "/report.zip",
+    "/house",
+    "/guide",
+    "/_nicegui/any",
+    "/sign-in/..",
+)
 
 
 async def echo(request: Request) -> Response:
