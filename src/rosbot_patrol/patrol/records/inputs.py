@@ -159,7 +159,7 @@ class Guarded:
         why: one sentence about what is not guarded, "" if everything is.
         is_quiet: quiet hours: nothing but triggers and people's orders moves the robot.
         holds_until: end of the running entry delay, in seconds since 1970: notices wait; None: no delay.
-        muted: rooms whose sensors start no mission, and until when, in seconds since 1970.
+        muted: rooms with sensors that start no mission, and until when, in seconds since 1970.
     """
 
     mode: str = "armed_away"

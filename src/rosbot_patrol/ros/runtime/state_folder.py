@@ -32,7 +32,7 @@ def state_folder(given: str | Path | None, namespace: str) -> Path:
 
 
 def zones_file(given: str, namespace: str) -> Path | None:
-    """The file of the owner's keep-out zones: the given one, "state": that of the state folder, None for ""."""
+    """The file of the owner's keep-out zones: the given one; for "state" the one in the state folder; None for ""."""
     if given == "state":
         return state_folder(None, namespace) / HOUSE / ZONES
     return Path(given).expanduser() if given else None
