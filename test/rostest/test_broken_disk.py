@@ -108,7 +108,7 @@ def test_a_disk_that_becomes_read_only_in_mid_run_silences_nothing(house, disk, 
     assert house.incident(told["id"]).verdict == "confirmed"
 
 
-@pytest.mark.parametrize("way", ["read-only", "a file"])
+@pytest.mark.parametrize("way", ["read-only", pytest.param("a file", marks=pytest.mark.long)])
 def test_a_state_folder_that_cannot_be_written_at_the_start_is_said_and_the_guard_guards(house, disk, phone, way):
     levels = listen(house)
     state = disk if way == "read-only" else house.folder / "file" / "state"

@@ -118,6 +118,7 @@ def test_the_emergency_stop_holds_over_a_kill(house):
     subscriber.unregister()
 
 
+@pytest.mark.long
 def test_what_was_called_while_the_patrol_was_down_is_looked_at(house):
     """The sensors' watch heard it."""
     from rosbot_patrol.msg import SensorStates

@@ -72,6 +72,7 @@ def test_an_intruder_is_mailed_once_and_an_empty_room_is_not(master: object, fol
         assert picture.std() > 10.0
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_without_the_detector_nothing_is_called_clear_and_nobody_is_mailed(master: object, folder: Path) -> None:
     # The proof that the test above needs the network: the same intruder, with darknet_ros killed first.
