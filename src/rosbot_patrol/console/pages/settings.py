@@ -105,7 +105,7 @@ def _draw_person(context: Context, view: View, account: Account) -> None:
         ui.label(_role_names(_)[account.role.value].partition(":")[0]).classes("opacity-80")
         ui.space()
         remove_text = _("Remove {name}").format(name=account.name)
-        ui.button(icon="delete", on_click=remove).props(f'flat round aria-label="{remove_text}"')
+        ui.button(icon="delete", on_click=remove).props("flat round").props["aria-label"] = remove_text
 
 
 def _code(context: Context, view: View) -> None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import Any
 
 from nicegui import ui
 
 from rosbot_patrol.console.house import edit
 from rosbot_patrol.console.pages.context import Context
-from rosbot_patrol.console.pages.frame import View, follow, say
-from rosbot_patrol.console.pages.house.form import Form, change
+from rosbot_patrol.console.pages.frame import View, say
+from rosbot_patrol.console.pages.house.form import Form, change, follow_house, icon_button
 from rosbot_patrol.errors import ParamError
 
 
@@ -33,7 +34,7 @@ def channels_part(context: Context, view: View) -> None:
         with box:
             _draw(context, view)
 
-    follow(context.hub, refresh)
+    follow_house(context, refresh)
 
 
 def _draw(context: Context, view: View) -> None:
@@ -51,15 +52,10 @@ def _draw(context: Context, view: View) -> None:
                 ui.label(name)
                 ui.label(where).classes("text-sm opacity-80")
             ui.space()
-            label = _("Test {name}").format(name=name)
-            ui.button(_("Test"), on_click=lambda name=name: _test(context, view, name)).props(
-                f'outline dense no-caps aria-label="{label}"'
-            )
+            test = ui.button(_("Test"), on_click=partial(_test, context, view, name)).props("outline dense no-caps")
+            test.props["aria-label"] = _("Test {name}").format(name=name)
             if name.partition(":")[0] in own:
-                label = _("Remove {name}").format(name=name)
-                ui.button(icon="delete", on_click=lambda name=name: _remove(context, view, name)).props(
-                    f'flat round dense aria-label="{label}"'
-                )
+                icon_button("delete", _("Remove {name}").format(name=name), partial(_remove, context, view, name))
 
 
 async def _test(context: Context, view: View, name: str) -> None:

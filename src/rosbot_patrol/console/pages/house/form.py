@@ -130,3 +130,26 @@ async def change(context: Context, view: View, what: str, do: Callable[[], objec
         return False
     context.desk.note(view.visitor, what)
     return True
+
+
+def icon_button(icon: str, label: str, on_click: Callable[[], Any]) -> ui.button:
+    """A button with an icon, and a name for those who do not see it; a name may hold any letters."""
+    button = ui.button(icon=icon, on_click=on_click).props("flat round dense")
+    button.props["aria-label"] = label
+    return button
+
+
+def follow_house(context: Context, refresh: Callable[[], object], *, calls: bool = False) -> None:
+    """Draw something now, and again whenever the house's files change, or with `calls` a sensor calls."""
+    drawn: object = None
+
+    def look() -> None:
+        nonlocal drawn
+        state = context.hub.state
+        shown = (state.house, state.calls if calls else ())
+        if shown != drawn:
+            drawn = shown
+            refresh()
+
+    look()
+    ui.timer(0.2, look)

@@ -12,8 +12,8 @@ from nicegui import ui
 from rosbot_patrol.console.house import edit
 from rosbot_patrol.console.live.map_picture import MapPicture
 from rosbot_patrol.console.pages.context import Context
-from rosbot_patrol.console.pages.frame import View, follow, say_problem
-from rosbot_patrol.console.pages.house.form import Form, change
+from rosbot_patrol.console.pages.frame import View, say_problem
+from rosbot_patrol.console.pages.house.form import Form, change, follow_house, icon_button
 from rosbot_patrol.console.pages.map_view import map_plan, points_text
 from rosbot_patrol.errors import MapError, ParamError
 from rosbot_patrol.geometry import Pose2D
@@ -60,7 +60,7 @@ class MapEditor:
             with ui.column().classes("gap-3"):
                 self._list = ui.column().classes("w-full gap-3")
         self._choose(_NONE)
-        follow(self._context.hub, self._draw_lists)
+        follow_house(self._context, self._draw_lists)
 
     def _choose(self, tool: str, moved: int | None = None) -> None:
         _ = self._view.words
@@ -210,11 +210,9 @@ class MapEditor:
             ui.label(text)
             ui.space()
             if edit_it is not None:
-                label = _("Change {name}").format(name=text)
-                ui.button(icon="edit", on_click=edit_it).props(f'flat round dense aria-label="{label}"')
+                icon_button("edit", _("Change {name}").format(name=text), edit_it)
             if remove is not None:
-                label = _("Remove {name}").format(name=text)
-                ui.button(icon="delete", on_click=remove).props(f'flat round dense aria-label="{label}"')
+                icon_button("delete", _("Remove {name}").format(name=text), remove)
 
     def _opener(self, number: int) -> _Click:
         async def open_it() -> None:

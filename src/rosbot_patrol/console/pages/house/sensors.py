@@ -8,8 +8,8 @@ from nicegui import ui
 
 from rosbot_patrol.console.house import edit
 from rosbot_patrol.console.pages.context import Context
-from rosbot_patrol.console.pages.frame import View, follow
-from rosbot_patrol.console.pages.house.form import Form
+from rosbot_patrol.console.pages.frame import View
+from rosbot_patrol.console.pages.house.form import Form, follow_house, icon_button
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.sensors.sensor_file import SensorSpec
 
@@ -30,7 +30,7 @@ def sensors_part(context: Context, view: View) -> None:
         with box:
             _draw(context, view)
 
-    follow(context.hub, refresh)
+    follow_house(context, refresh, calls=True)
 
 
 def _draw(context: Context, view: View) -> None:
@@ -64,9 +64,7 @@ def _line(context: Context, view: View, spec: SensorSpec, *, is_new: bool = Fals
             ui.label(where if spec.enabled else f"{where} · {_('out of service')}").classes("text-sm opacity-80")
         ui.space()
         label = _("Change sensor {number}").format(number=spec.id)
-        ui.button(icon="edit", on_click=lambda: _edit(context, view, spec, is_new=is_new)).props(
-            f'flat round dense aria-label="{label}"'
-        )
+        icon_button("edit", label, lambda: _edit(context, view, spec, is_new=is_new))
 
 
 async def _edit(context: Context, view: View, spec: SensorSpec | None, *, is_new: bool = False) -> None:

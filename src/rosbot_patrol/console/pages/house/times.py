@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from nicegui import ui
 
 from rosbot_patrol.console.house import edit
 from rosbot_patrol.console.pages.context import Context
-from rosbot_patrol.console.pages.frame import View, follow
-from rosbot_patrol.console.pages.house.form import Form
+from rosbot_patrol.console.pages.frame import View
+from rosbot_patrol.console.pages.house.form import Form, follow_house, icon_button
 from rosbot_patrol.console.sentences import MODES, mode_name
 from rosbot_patrol.console.words import Words
 from rosbot_patrol.errors import ParamError
@@ -33,7 +34,7 @@ def times_part(context: Context, view: View) -> None:
             except ParamError as err:
                 ui.label(str(err)).classes("console-problem console-error").props('role="alert"')
 
-    follow(context.hub, refresh)
+    follow_house(context, refresh)
 
 
 def _heading(text: str) -> None:
@@ -83,9 +84,7 @@ def _modes(context: Context, view: View) -> None:
                     ui.label(", ".join(parts)).classes("text-sm opacity-80")
                 ui.space()
                 label = _("Change {name}").format(name=mode_name(mode, _))
-                ui.button(icon="edit", on_click=lambda mode=mode: _edit_mode(context, view, mode)).props(
-                    f'flat round dense aria-label="{label}"'
-                )
+                icon_button("edit", label, partial(_edit_mode, context, view, mode))
         ui.separator()
         ui.label(_("Quiet hours: no round starts")).classes("font-medium")
         for i, window in enumerate(rules.quiet_hours):
@@ -128,9 +127,7 @@ def _quiet_line(context: Context, view: View, index: int, window: Window) -> Non
         ui.label(f"{text}, {days}" if days else text)
         ui.space()
         label = _("Change {name}").format(name=text)
-        ui.button(icon="edit", on_click=lambda: _edit_quiet(context, view, index)).props(
-            f'flat round dense aria-label="{label}"'
-        )
+        icon_button("edit", label, lambda: _edit_quiet(context, view, index))
 
 
 async def _edit_quiet(context: Context, view: View, index: int | None) -> None:
@@ -179,9 +176,7 @@ def _rounds(context: Context, view: View) -> None:
                     ui.label(_round_text(context, entry, _)).classes("text-sm opacity-80")
                 ui.space()
                 label = _("Change {name}").format(name=entry.name)
-                ui.button(icon="edit", on_click=lambda entry=entry: _edit_round(context, view, entry)).props(
-                    f'flat round dense aria-label="{label}"'
-                )
+                icon_button("edit", label, partial(_edit_round, context, view, entry))
         ui.button(_("Add a round"), icon="add", on_click=lambda: _edit_round(context, view, None)).props(
             "outline no-caps"
         )
