@@ -88,6 +88,14 @@ class Browser:
     def press(self, name):
         self._click(lambda: self.button(name), f"the button '{name}'")
 
+    def press_for(self, name, text):
+        """Press a button of a list until what it opens is there: the list may be drawn anew under the press."""
+        for _ in range(5):
+            self.press(name)
+            with contextlib.suppress(AssertionError):
+                return self.see(text, 4.0)
+        return self.see(text)
+
     def click(self, xpath):
         self._click(lambda: self.find(xpath), xpath)
 
@@ -120,7 +128,19 @@ class Browser:
             field = self.find(f'//input[@id="{key}"]')
             field.clear()
             field.send_keys(value)
-        self.find('//button[@type="submit"]').click()
+        button = self.find('//button[@type="submit"]')
+        button.click()
+
+        def is_answered():
+            try:
+                return not button.is_enabled()
+            except StaleElementReferenceException:
+                return True
+
+        deadline = time.monotonic() + PATIENCE  # what is opened before the answer would be overtaken by it
+        while not is_answered():
+            assert time.monotonic() < deadline, "no answer to the sign-in"
+            time.sleep(0.05)
 
     def save(self, name):
         if folder := os.environ.get("ROSBOT_TEST_PICTURES"):
