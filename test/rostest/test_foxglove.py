@@ -46,26 +46,29 @@ def test_topics_are_shown_as_they_are_and_read_only_while_somebody_looks(house):
     from nav_msgs.msg import OccupancyGrid
     from std_msgs.msg import String
 
-    latched = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
+    latched = rospy.Publisher("/foxglove_map", OccupancyGrid, queue_size=1, latch=True)
     grid = OccupancyGrid(data=[0, 100, -1, 0])
     grid.info.width = grid.info.height = 2
     latched.publish(grid)
-    word = rospy.Publisher("/word", String, queue_size=1)
-    rospy.Timer(rospy.Duration(0.1), lambda _: word.publish("hello"))
+    word = rospy.Publisher("/foxglove_word", String, queue_size=1)
+    timer = rospy.Timer(rospy.Duration(0.1), lambda _: word.publish("hello"))
     node = house._start(["rosrun", "rosbot_patrol", "foxglove"], {"port": 0})
     wait_until(lambda: "open ws://" in house.log(node), 20, "the server")
     url = house.log(node).partition("open ")[2].split()[0]
     for _ in range(2):  # the second viewer gets the latched map, too
-        channels, got = asyncio.run(collect(url, ["/map", "/word"]))
-        assert channels["/map"]["schemaName"] == "nav_msgs/OccupancyGrid"
-        assert "int8[] data" in channels["/map"]["schema"]
-        assert channels["/map"]["encoding"] == "ros1"
-        assert OccupancyGrid().deserialize(got["/map"][0]).data == (0, 100, -1, 0)
-        assert String().deserialize(got["/word"][0]).data == "hello"
+        channels, got = asyncio.run(collect(url, ["/foxglove_map", "/foxglove_word"]))
+        assert channels["/foxglove_map"]["schemaName"] == "nav_msgs/OccupancyGrid"
+        assert "int8[] data" in channels["/foxglove_map"]["schema"]
+        assert channels["/foxglove_map"]["encoding"] == "ros1"
+        assert OccupancyGrid().deserialize(got["/foxglove_map"][0]).data == (0, 100, -1, 0)
+        assert String().deserialize(got["/foxglove_word"][0]).data == "hello"
     wait_until(lambda: word.get_num_connections() == 0, 10, "nobody looks any more")
     buffer = io.BytesIO()
     grid.serialize(buffer)
-    assert got["/map"][0] == buffer.getvalue()
+    assert got["/foxglove_map"][0] == buffer.getvalue()
+    timer.shutdown()
+    for publisher in (latched, word):  # the tests of a process share a node
+        publisher.unregister()
 
 
 def test_a_taken_port_is_one_sentence(house):
