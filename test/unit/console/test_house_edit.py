@@ -8,9 +8,10 @@ import pytest
 
 from rosbot_patrol.alerts.channels.config import Surroundings
 from rosbot_patrol.console.house import edit
-from rosbot_patrol.console.house.files import CHANNELS, KNOWN, ROOMS, SCHEDULE, SENSORS, SHAPES, Given, HouseFiles
+from rosbot_patrol.console.house.files import KNOWN, SHAPES, Given, HouseFiles
 from rosbot_patrol.errors import AccessError, ParamError
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.house.own_files import CHANNELS, ROOMS, SCHEDULE, SENSORS
 from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.intruder.known_objects import KnownObject
 

@@ -8,8 +8,9 @@ from typing import Any
 
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from rosbot_patrol.console.house.files import ARMING, CHANNELS, KNOWN, ROOMS, SCHEDULE, SENSORS, SHAPES, HouseFiles
+from rosbot_patrol.console.house.files import KNOWN, SHAPES, HouseFiles
 from rosbot_patrol.errors import AccessError, ParamError
+from rosbot_patrol.patrol.house.own_files import ARMING, CHANNELS, ROOMS, SCHEDULE, SENSORS
 from rosbot_patrol.patrol.house.rooms import MAX_ROOMS, Room, Rooms
 from rosbot_patrol.patrol.intruder.known_objects import KnownObject
 

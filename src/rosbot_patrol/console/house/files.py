@@ -26,21 +26,22 @@ from rosbot_patrol.files import write_atomic
 from rosbot_patrol.maps.zones import ZONES, Zone, read_zones
 from rosbot_patrol.patrol.guard.arming import ArmingRules, load_rules
 from rosbot_patrol.patrol.guard.schedule import Round, load_schedule
-from rosbot_patrol.patrol.house.own_files import HOUSE, own_file, place_to_write
+from rosbot_patrol.patrol.house.own_files import (
+    ARMING,
+    CHANNELS,
+    HOUSE,
+    ROOMS,
+    SCHEDULE,
+    SENSORS,
+    own_file,
+    place_to_write,
+)
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.intruder.known_objects import FOUND_FALSE, KnownObject, load_known
 from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
 
-ROOMS, SENSORS, ARMING, SCHEDULE, CHANNELS, KNOWN, SHAPES = (
-    "rooms.yaml",
-    "sensors.yaml",
-    "arming.yaml",
-    "schedule.yaml",
-    "channels.yaml",
-    FOUND_FALSE,
-    ZONES,
-)
-"""Names of the files in the folder of the house."""
+KNOWN, SHAPES = FOUND_FALSE, ZONES
+"""Names of two more files."""
 
 _UNDO = "undo.json"
 _NEW = {

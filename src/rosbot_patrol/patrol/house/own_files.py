@@ -6,12 +6,22 @@ copy in the guard's state folder, and counts instead. So does a file there where
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from rosbot_patrol.package_files import package_file
 
 HOUSE = "house"
 """Name of the folder in the guard's state folder."""
+
+ROOMS, SENSORS, ARMING, SCHEDULE, CHANNELS = (
+    "rooms.yaml",
+    "sensors.yaml",
+    "arming.yaml",
+    "schedule.yaml",
+    "channels.yaml",
+)
+"""Names of the owner's files in that folder, where none was given."""
 
 
 def own_file(given: str, state_dir: Path, name: str) -> str:
@@ -34,6 +44,13 @@ def place_to_write(given: str, state_dir: Path, name: str) -> Path:
         return state_dir / HOUSE / name
     path = Path(given).expanduser()
     return state_dir / HOUSE / path.name if is_shipped(path) else path
+
+
+def watched_files(given: Mapping[str, str], state_dir: Path) -> list[Path]:
+    """The files of paths from the parameters, by their names here, and the places of the owner's copies."""
+    found = [Path(path).expanduser() for path in given.values() if path not in ("", "none")]
+    found += [place_to_write(path, state_dir, name) for name, path in given.items()]
+    return list(dict.fromkeys(found))
 
 
 def is_shipped(path: Path) -> bool:

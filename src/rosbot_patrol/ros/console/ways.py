@@ -13,9 +13,10 @@ from rosbot_patrol.alerts.channels.channel_check import make_test_notice, try_ch
 from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.settings_file import read_settings
-from rosbot_patrol.console.house.files import CHANNELS, HouseFiles
+from rosbot_patrol.console.house.files import HouseFiles
 from rosbot_patrol.console.live.orders import Answer
 from rosbot_patrol.errors import ParamError
+from rosbot_patrol.patrol.house.own_files import CHANNELS
 
 
 class Ways:

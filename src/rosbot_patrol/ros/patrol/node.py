@@ -69,13 +69,13 @@ from rosbot_patrol.ros.patrol.sensor_watch_alive import Neighbour
 from rosbot_patrol.ros.patrol.settings import (
     NO_ROUNDS,
     check_files,
+    files_of,
     load_flat,
     load_house,
     load_manager_params,
     load_or_say,
     own_channels,
     own_params,
-    watched_files,
 )
 from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
@@ -100,7 +100,7 @@ class PatrolNode:
         given, mail = load_flat(NodeParams, tree), load_flat(MailParams, tree)
         folder = state_folder(given.state_dir, rospy.get_namespace())
         self._zones = folder / HOUSE / ZONES
-        files = watched_files(given, mail, folder)
+        files = files_of(given, mail, folder)
         given_mail = mail
         self.params, mail = own_params(given, folder), own_channels(mail, folder)
         rooms, self.sensors = load_house(self.params)

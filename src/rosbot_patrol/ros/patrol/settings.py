@@ -21,7 +21,16 @@ from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.arming import load_rules
 from rosbot_patrol.patrol.guard.battery import BatteryParams
 from rosbot_patrol.patrol.guard.schedule import Round, load_schedule
-from rosbot_patrol.patrol.house.own_files import HOUSE, own_file, place_to_write
+from rosbot_patrol.patrol.house.own_files import (
+    ARMING,
+    CHANNELS,
+    HOUSE,
+    ROOMS,
+    SCHEDULE,
+    SENSORS,
+    own_file,
+    watched_files,
+)
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.mission.drive import DriveParams
 from rosbot_patrol.patrol.mission.params import ManagerParams, NodeParams, manager_params
@@ -41,10 +50,9 @@ log = logging.getLogger(__name__)
 P = TypeVar("P", bound="DataclassInstance")
 V = TypeVar("V")
 
-OWN = {"path_to_params": "rooms.yaml", "sensors": "sensors.yaml", "arming": "arming.yaml", "schedule": "schedule.yaml"}
+OWN = {"path_to_params": ROOMS, "sensors": SENSORS, "arming": ARMING, "schedule": SCHEDULE}
 """Parameters that name a file of the house, and the name of the owner's file."""
 
-CHANNELS = "channels.yaml"
 NO_ROUNDS: tuple[tuple[Round, ...], tzinfo | None] = ((), None)
 
 
@@ -99,12 +107,10 @@ def check_files(node: NodeParams, mail: MailParams) -> None:
     load_schedule(node.schedule, rooms)
 
 
-def watched_files(node: NodeParams, mail: MailParams, state_dir: Path) -> list[Path]:
+def files_of(node: NodeParams, mail: MailParams, state_dir: Path) -> list[Path]:
     """All files that the node reads at its start, and the places where the owner's copies would be."""
     given = {name: getattr(node, key) for key, name in OWN.items()} | {CHANNELS: mail.channels}
-    found = [Path(value).expanduser() for value in given.values() if value not in ("", "none")]
-    found += [place_to_write(value, state_dir, name) for name, value in given.items()]
-    return [*dict.fromkeys(found), state_dir / HOUSE / ZONES]
+    return [*watched_files(given, state_dir), state_dir / HOUSE / ZONES]
 
 
 def load_or_say(load: Callable[[str, Rooms], V], path: str, rooms: Rooms, without: V, health: Health) -> V:

@@ -31,7 +31,7 @@ from rosbot_patrol.files import read_json, write_json
 from rosbot_patrol.msg import Arming as ArmingMsg
 from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
-from rosbot_patrol.patrol.house.own_files import own_file, place_to_write
+from rosbot_patrol.patrol.house.own_files import CHANNELS, ROOMS, SENSORS, own_file, watched_files
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.ros.bridge.links import links_from_msg
 from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
@@ -81,11 +81,11 @@ def load_group(cls: type, tree: Mapping[str, Any]) -> Any:
 
 def own_params(params: SensorWatchParams, state_dir: Path) -> SensorWatchParams:
     """The parameters with the owner's copies of files that come with the program."""
-    sensors = own_file(params.sensors, state_dir, "sensors.yaml")
+    sensors = own_file(params.sensors, state_dir, SENSORS)
     is_own = sensors not in (params.sensors, "")  # then the owner decides, not the simulator's file
     return replace(
         params,
-        path_to_params=own_file(params.path_to_params, state_dir, "rooms.yaml"),
+        path_to_params=own_file(params.path_to_params, state_dir, ROOMS),
         sensors=sensors,
         motion_sensors="" if is_own else params.motion_sensors,
     )
@@ -102,9 +102,7 @@ def load_list(params: SensorWatchParams) -> SensorList:
 
 def _files(params: SensorWatchParams, mail: MailParams, state_dir: Path) -> list[Path]:
     """All files that the node reads at its start, and the places where the owner's copies would be."""
-    given = {"rooms.yaml": params.path_to_params, "sensors.yaml": params.sensors, "channels.yaml": mail.channels}
-    found = [Path(value).expanduser() for value in given.values() if value not in ("", "none")]
-    return [*found, *(place_to_write(value, state_dir, name) for name, value in given.items())]
+    return watched_files({ROOMS: params.path_to_params, SENSORS: params.sensors, CHANNELS: mail.channels}, state_dir)
 
 
 class SensorWatch:
@@ -121,7 +119,7 @@ class SensorWatch:
         self._memory = folder / "sensors.json"
         self._health = Health("motion sensors")
         self._files = FileWatch(_files(given, mail, folder), lambda: load_list(own_params(given, folder)), self._health)
-        mail = replace(mail, channels=own_file(mail.channels, folder, "channels.yaml"))
+        mail = replace(mail, channels=own_file(mail.channels, folder, CHANNELS))
         self._post = OwnerPost(mail, folder, self._health)
         self._watch = Supervisor(sensors, load_group(WatchTimes, tree), time.monotonic())
         self._guarded: frozenset[int] | None = None  # guarded rooms, None for all
