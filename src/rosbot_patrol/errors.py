@@ -23,6 +23,7 @@
     |- ImageError         invalid bytes of a picture
     |- SensorError        a sensor's message that cannot be used
     |- AlertError         a notice that could not be delivered
+    |- HostError          a program, file or port of the machine that the set-up needs
     |- AccessError        a person, password or order that the console does not take
     `- StoreError         incidents that could not be kept or read
 
@@ -194,6 +195,20 @@ class ProtocolError(PatrolError):
     def __init__(self, peer: str, problem: str) -> None:
         super().__init__(f"{peer}: {problem}" if peer else problem)
         self.peer = peer
+        self.problem = problem
+
+
+class HostError(PatrolError):
+    """A program, file or port of this machine that cannot be used.
+
+    Args:
+        what: its name, path or command.
+        problem: what is wrong, and what to do.
+    """
+
+    def __init__(self, what: str, problem: str) -> None:
+        super().__init__(f"{what}: {problem}")
+        self.what = what
         self.problem = problem
 
 

@@ -15,7 +15,7 @@ ROWS: list[set[str]] = [
     {"errors", "counts"},
     {"params", "files", "yaml_files"},
     {"kernels", "tunable", "package_files"},
-    {"geometry"},
+    {"geometry", "host", "graph"},
     {"grid", "scan", "goal"},
     {"maps", "images", "tf", "scan_line", "scan_check"},
     {"costmap", "scan_feed"},
