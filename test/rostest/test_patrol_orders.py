@@ -4,6 +4,8 @@ import json
 import os
 import signal
 import time
+import xmlrpc.client
+from types import SimpleNamespace
 
 import pytest
 from patrol_house import ROOT, wait_until
@@ -118,15 +120,13 @@ def test_the_emergency_stop_holds_over_a_kill(house):
     subscriber.unregister()
 
 
-@pytest.mark.long
-def test_what_was_called_while_the_patrol_was_down_is_looked_at(house):
-    """The sensors' watch heard it."""
-    from rosbot_patrol.msg import SensorStates
+def plain_text(mail):
+    part = next(part for part in mail.walk() if part.get_content_type() == "text/plain")
+    return " ".join(part.get_payload(decode=True).decode().split())
 
-    heard = []
-    house.ends.append(rospy.Subscriber("/sensors/states", SensorStates, heard.append))
-    house.start_move_base()
-    watch = house._start(
+
+def start_watch(house):
+    return house._start(
         ["rosrun", "rosbot_patrol", "sensor_watch", "__name:=sensor_watch"],
         {
             "path_to_params": str(ROOT / "params" / "room_points.yaml"),
@@ -135,6 +135,41 @@ def test_what_was_called_while_the_patrol_was_down_is_looked_at(house):
             "maildir": str(house.folder / "mail"),
         },
     )
+
+
+@pytest.mark.long
+def test_a_patrol_that_was_made_deaf_says_so_and_hears_again(house):
+    """Somebody signs the patrol off at the master; a bridge that starts again then does not find it."""
+    from rosbot_patrol.msg import EspTrigger
+
+    house.start_move_base()
+    house.start_patrol()
+    start_watch(house)
+    master = xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"])
+    patrol_uri = master.lookupNode("/test", "/patrolling_node")[2]
+    patrol = xmlrpc.client.ServerProxy(patrol_uri)
+    speaker = {"now": house.trigger}
+    beat = rospy.Timer(rospy.Duration(0.25), lambda _: speaker["now"].publish(EspTrigger(id=1)))
+    house.ends.append(SimpleNamespace(unregister=beat.shutdown))
+    wait_until(lambda: "/motion_trigger" in str(patrol.getBusInfo("/test")), 20, "the link")
+    time.sleep(6.0)  # the watch counts
+    assert master.unregisterSubscriber("/patrolling_node", "/motion_trigger", patrol_uri)[2] == 1
+    house.trigger.unregister()
+    house.trigger = speaker["now"] = rospy.Publisher("/motion_trigger", EspTrigger, queue_size=10)
+    wait_until(lambda: "the link was cut, listening anew" in house.log(house.patrol), 30, "the patrol's word")
+    wait_until(lambda: "the motion sensors are heard again" in house.log(house.patrol), 20, "that it hears")
+    wait_until(lambda: any("its link was cut" in plain_text(mail) for mail in house.mails()), 20, "a mail")
+
+
+@pytest.mark.long
+def test_what_was_called_while_the_patrol_was_down_is_looked_at(house):
+    """The sensors' watch heard it."""
+    from rosbot_patrol.msg import SensorStates
+
+    heard = []
+    house.ends.append(rospy.Subscriber("/sensors/states", SensorStates, heard.append))
+    house.start_move_base()
+    watch = start_watch(house)
     house.start_patrol()
     wait_until(lambda: heard, 20, "the sensors' watch")
     os.killpg(house.patrol.pid, signal.SIGKILL)

@@ -294,3 +294,29 @@ def test_people_at_home_are_no_mail_and_a_sensor_that_is_stuck_is_told_when_they
     watch.mail(title.format(1, "guest room"))
     for sensor in sensors:
         sensor.stop()
+
+
+def test_a_second_driver_and_other_settings_are_told(ros, tmp_path):
+    probe, thief = ros.probe(), ros.probe()
+    probe.tell(subscribe=EVENTS)
+    watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], start_grace=60.0)
+    watch.node.says("watching 1 sensor")
+    probe.tell(advertise=["/cmd_vel", "geometry_msgs/Twist"])
+    thief.tell(advertise=["/cmd_vel", "geometry_msgs/Twist"])
+    said = probe.expect(lambda heard: heard.get("kind") == "second_driver" and heard.get("active"))
+    assert "has 2 publishers where one alone may drive the robot" in said["text"]
+    text = plain_text(watch.mail("topic /cmd_vel has a second publisher"))
+    assert "What to do: where you drive with a program of your own, end it." in text
+    thief.process.stop()
+    probe.expect(lambda heard: heard.get("kind") == "second_driver" and not heard.get("active"))
+    ros.set_param("/sensor_watch/email_to", "thief@example.org")
+    said = probe.expect(lambda heard: heard.get("kind") == "settings_changed" and heard.get("active"))
+    assert "email_to changed" in said["text"]
+    assert "thief@" not in said["text"]
+    ros.forget("/sensor_watch")
+
+
+def test_hosts_that_make_no_sense_are_refused(ros, tmp_path):
+    watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], graph_hosts="pc 10.0.0.0/99")
+    watch.node.says("/sensor_watch/graph_hosts: '10.0.0.0/99' is no name, address or network")
+    assert watch.node.stop(None) == 1

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rosbot_patrol.sensors import wording
-from rosbot_patrol.sensors.problems import Key, Kind, Problem
+from rosbot_patrol.sensors.problems import OF_GRAPH, Key, Kind, Problem
 from rosbot_patrol.sensors.settings import NoticeTimes
 from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
 from rosbot_patrol.sensors.wording import Item
@@ -115,15 +115,19 @@ class Notices:
         unreported = {key: p for key, p in problems.items() if key not in self._reported and key not in calm}
         new = {key: p for key, p in unreported.items() if not self._is_covered(p, problems)}
         well = self._well(problems, statuses, watch, now)
-        due = any(now - self._seen[key] >= self._times.notice_after for key in new)
+        due = any(now - self._seen[key] >= self._delay(key) for key in new)
         if not (due or well) or now - self._last < self._times.notice_interval:
             return None
-        along = min(ALONG, self._times.notice_after)
-        items = [self._tell(p, watch, wall) for key, p in new.items() if now - self._seen[key] >= along]
+        along = {key: min(ALONG, self._delay(key)) for key in new}
+        items = [self._tell(p, watch, wall) for key, p in new.items() if now - self._seen[key] >= along[key]]
         items += self._tell_well(well, watch, wall)
         self._last = now
         self._count += 1
         return self._report(tuple(items), statuses, watch, wall)
+
+    def _delay(self, key: Key) -> float:
+        """How long a problem must last [s]; one of the graph may be an attack, and is reported at once."""
+        return 0.0 if key.kind in OF_GRAPH else self._times.notice_after
 
     def _is_calm(self, key: Key, watch: Supervisor) -> bool:
         """Whether the cause of a problem may be people at home."""
@@ -131,6 +135,8 @@ class Notices:
 
     def _is_covered(self, problem: Problem, problems: Mapping[Key, Problem]) -> bool:
         """Whether another problem already says it."""
+        if problem.key.kind is Kind.LINK_GONE:
+            return any(key.kind in (Kind.PATROL_GONE, Kind.BRIDGE_GONE) for key in problems)
         if problem.key.kind is not Kind.SILENT:
             return False
         gone = Key(Kind.BRIDGE_GONE.value, bridge=problem.bridge)
@@ -193,7 +199,9 @@ class Notices:
         for title, of_one in by_title.items():
             since = min(self._reported.pop(key).since for key in of_one)
             what = wording.short([key.kind for key in of_one])
-            items.append(Item(kind=None, title=title, what=what, since=since, lasted=max(wall - since, 0.0)))
+            of_graph = any(key.kind in OF_GRAPH for key in of_one)
+            lasted = max(wall - since, 0.0)
+            items.append(Item(kind=None, title=title, what=what, since=since, lasted=lasted, is_of_graph=of_graph))
         return items
 
     def _report(

@@ -1,15 +1,21 @@
-"""Kinds of problems of motion sensors and bridges, and the record of one problem."""
+"""Kinds of problems of motion sensors, bridges and the ROS graph, and the record of one problem."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
 
+from rosbot_patrol.graph.judge import Fault
+
 
 class Kind(Enum):
     """Kind of a problem, the worst first; values are those of SensorEvent."""
 
     PATROL_GONE = "patrol_gone"
+    SECOND_DRIVER = Fault.SECOND_DRIVER.value
+    STRANGE_NODE = Fault.STRANGE_NODE.value
+    LINK_GONE = Fault.LINK_GONE.value
+    SETTINGS_CHANGED = Fault.SETTINGS_CHANGED.value
     SILENT = "silent"
     BRIDGE_GONE = "bridge_gone"
     DUPLICATE_ID = "duplicate_id"
@@ -21,12 +27,16 @@ class Kind(Enum):
     CLOCK_OFF = "clock_off"
 
 
-SERIOUS = frozenset({Kind.PATROL_GONE, Kind.SILENT, Kind.BRIDGE_GONE, Kind.DUPLICATE_ID, Kind.WRONG_PEER})
+OF_GRAPH = frozenset({Kind.SECOND_DRIVER, Kind.STRANGE_NODE, Kind.LINK_GONE, Kind.SETTINGS_CHANGED})
+SERIOUS = OF_GRAPH | {Kind.PATROL_GONE, Kind.SILENT, Kind.BRIDGE_GONE, Kind.DUPLICATE_ID, Kind.WRONG_PEER}
 
 
 @dataclass(frozen=True, order=True)
 class Key:
-    """Identity of a problem: its kind, and a sensor's id, or -1 and a node (a bridge, the patrol)."""
+    """Identity of a problem: its kind, and a sensor's id, or -1 and a node (a bridge, the patrol).
+
+    A problem of the graph has -1 and what it is about, in words.
+    """
 
     kind_name: str
     sensor_id: int = -1

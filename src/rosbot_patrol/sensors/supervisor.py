@@ -11,7 +11,9 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from rosbot_patrol.graph.judge import Fault, Finding
 from rosbot_patrol.sensors.problems import (
+    OF_GRAPH,
     Event,
     Key,
     Kind,
@@ -32,6 +34,10 @@ MAX_BRIDGES = 64
 # Times [s] for which a condition must hold to begin, and must not hold to be over.
 _DELAYS: dict[Kind, tuple[float, float]] = {
     Kind.PATROL_GONE: (0.0, 3.0),
+    Kind.SECOND_DRIVER: (3.0, 10.0),
+    Kind.STRANGE_NODE: (0.0, 10.0),
+    Kind.LINK_GONE: (0.0, 5.0),  # has its own time
+    Kind.SETTINGS_CHANGED: (0.0, 0.0),
     Kind.SILENT: (0.0, 0.0),  # has its own times
     Kind.FLAPPING: (0.0, 0.0),  # has its own times, too
     Kind.STUCK_ON: (0.0, 0.0),
@@ -106,6 +112,7 @@ class Supervisor:
         self._slept = 0.0
         self._bridges: dict[str, _Bridge] = {}
         self._patrol: tuple[str, float] | None = None
+        self._graph: tuple[Finding, ...] = ()
         self._conditions: dict[Key, _Condition] = {}
         self._tracked = {spec.id: Tracked(spec, times, now, is_listed=True) for spec in sensors}
 
@@ -150,6 +157,10 @@ class Supervisor:
         """Record a sign of life of the patrol's node."""
         self._patrol = node, self._own(now)
 
+    def graph_seen(self, findings: Iterable[Finding]) -> None:
+        """Record what is wrong with the ROS graph now; open ports are no problem of a moment, and left out."""
+        self._graph = tuple(each for each in findings if each.fault is not Fault.GRAPH_OPEN)
+
     def _own(self, now: float) -> float:
         """Time on the supervisor's own clock; a message that waited in a queue may be slightly late."""
         step = now - self._last
@@ -180,6 +191,8 @@ class Supervisor:
             node, heard = self._patrol
             what = "has gone, or hangs: nothing is heard of it, and motion is not answered"
             yield Problem(key=bridge_key(Kind.PATROL_GONE, node), since=heard, what=what)
+        for found in self._graph:
+            yield Problem(key=bridge_key(Kind(found.fault.value), found.subject), since=t, what=found.what)
         for name, bridge in self._bridges.items():
             yield from self._of_bridge(name, bridge, t)
         for sensor_id, tracked in list(self._tracked.items()):
@@ -253,6 +266,8 @@ class Supervisor:
         """Name of a problem's sensor or bridge, for people."""
         if key.kind is Kind.PATROL_GONE:
             return f"the patrol ({key.bridge.strip('/')})"
+        if key.kind in OF_GRAPH:
+            return key.bridge
         return f"bridge {key.bridge}" if key.sensor_id < 0 else self.sensors.title(key.sensor_id)
 
     def problems(self) -> dict[Key, Problem]:

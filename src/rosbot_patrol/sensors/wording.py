@@ -1,4 +1,4 @@
-"""Texts for the owner about motion sensors: what is wrong, since when, and what to do."""
+"""Texts for the owner about motion sensors and the ROS graph: what is wrong, since when, and what to do."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.counts import count_of
-from rosbot_patrol.sensors.problems import Kind, duration
+from rosbot_patrol.sensors.problems import OF_GRAPH, Kind, duration
 
 MAX_LISTED = 20  # of one kind in one notice
 
 _ONE_IS: dict[Kind, str] = {
     Kind.PATROL_GONE: "has gone, or hangs",
+    Kind.SECOND_DRIVER: "has a second publisher",
+    Kind.STRANGE_NODE: "runs on a machine that the guard does not know",
+    Kind.LINK_GONE: "has gone",
+    Kind.SETTINGS_CHANGED: "has other settings than at its start",
     Kind.SILENT: "is silent",
     Kind.BRIDGE_GONE: "has gone",
     Kind.DUPLICATE_ID: "is reported by two at a time",
@@ -26,6 +30,16 @@ _ONE_IS: dict[Kind, str] = {
 _TO_DO: dict[Kind, str] = {
     Kind.PATROL_GONE: "where it has ended, it is started again by itself within seconds, and takes up what it was at."
     " Where it has not come back by now, look at the robot, at its log and at its disk, and start it anew.",
+    Kind.SECOND_DRIVER: "where you drive with a program of your own, end it. Otherwise somebody in your network drives"
+    " the robot: press the emergency stop, take the robot off the network, and close the graph with scripts/secure"
+    " (docs/security.md).",
+    Kind.STRANGE_NODE: "if the machine is yours, name it in graph_hosts. Otherwise somebody in your network is in the"
+    " guard's graph and can command it: take the robot off the network, and close the graph with scripts/secure"
+    " (docs/security.md).",
+    Kind.LINK_GONE: "look at the device, its cable and the log of the program that served it. Where both are well,"
+    " somebody may have cut the link through the network: scripts/secure closes the graph (docs/security.md).",
+    Kind.SETTINGS_CHANGED: "where nobody of yours has changed them, somebody in your network has, and the program takes"
+    " them at its next start: start the guard anew, and close the graph with scripts/secure (docs/security.md).",
     Kind.SILENT: "see that it has power and Wi-Fi, and switch it off and on. Until it is heard again, nobody notices"
     " motion in its room.",
     Kind.BRIDGE_GONE: "it is started again by itself within seconds. Where it is not, look at the machine that it runs"
@@ -57,6 +71,7 @@ class Item:
         kind: of the problem; None: all is well again.
         title: name of the sensor or bridge; what: the words that follow it.
         since: begin, seconds since 1970; lasted: how long [s].
+        is_of_graph: it is, or was, a problem of the ROS graph.
     """
 
     kind: Kind | None
@@ -64,6 +79,7 @@ class Item:
     what: str
     since: float
     lasted: float
+    is_of_graph: bool = False
 
 
 def subject(items: Sequence[Item]) -> str:
@@ -82,11 +98,13 @@ def subject(items: Sequence[Item]) -> str:
             f"{gone.title} {_ONE_IS[Kind.PATROL_GONE]}, and {count_of(len(wrong) - 1, 'more is', 'more are')} not well"
         )
     elif wrong:
-        parts.append(f"{len(wrong)} things are wrong with the motion sensors")
+        what = "the guard's network" if kinds <= OF_GRAPH else "the motion sensors"
+        parts.append(f"{len(wrong)} things are wrong with {what}")
     if len(well) == 1:
         parts.append(f"{well[0].title} is well again")
     elif well:
-        parts.append(f"{len(well)} motion sensors are well again")
+        what = "things" if any(item.is_of_graph for item in well) else "motion sensors"
+        parts.append(f"{len(well)} {what} are well again")
     return "rosbot patrol: " + ", ".join(parts)
 
 
@@ -132,6 +150,10 @@ def short(kinds: Sequence[Kind]) -> str:
     """Problems in a few words: "it was silent, it came and went"."""
     was = {
         Kind.PATROL_GONE: "it was gone",
+        Kind.SECOND_DRIVER: "it had a second publisher",
+        Kind.STRANGE_NODE: "it was there",
+        Kind.LINK_GONE: "it was gone",
+        Kind.SETTINGS_CHANGED: "it had other settings",
         Kind.SILENT: "it was silent",
         Kind.BRIDGE_GONE: "it was gone",
         Kind.DUPLICATE_ID: "two reported its id",

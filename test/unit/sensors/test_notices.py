@@ -1,6 +1,7 @@
 import pytest
 from sensor_house import House
 
+from rosbot_patrol.graph.judge import Fault, Finding
 from rosbot_patrol.sensors.looks import Looks
 from rosbot_patrol.sensors.notices import Notices
 from rosbot_patrol.sensors.problems import Kind
@@ -297,3 +298,39 @@ def test_very_long_without_motion_is_told_where_it_is_guarded_only():
     assert [notice.subject for notice in owner.got] == [
         "rosbot patrol: sensor 2 in room 2 (place 2) has seen no motion for very long"
     ]
+
+
+def test_a_second_driver_is_told_at_once_and_again_when_it_has_gone():
+    owner = Owner(House(1))
+    owner.run(5)
+    thief = Finding(fault=Fault.SECOND_DRIVER, subject="topic /cmd_vel", what="has 2 publishers: /thief, /twist_mux")
+    owner.house.watch.graph_seen([thief])
+    (notice,) = owner.run(6)
+    assert notice.subject == "rosbot patrol: topic /cmd_vel has a second publisher"
+    assert "- Topic /cmd_vel has 2 publishers: /thief, /twist_mux. Since" in notice.text
+    assert "scripts/secure" in notice.text
+    owner.house.watch.graph_seen([])
+    (notice,) = owner.run(1000)
+    assert notice.subject == "rosbot patrol: topic /cmd_vel is well again"
+
+
+def test_a_link_of_a_dead_bridge_is_the_bridges_problem():
+    owner = Owner(House(1))
+    owner.run(30)
+    owner.house.bridges.clear()
+    gone = Finding(fault=Fault.LINK_GONE, subject="the bridge of the motion sensors", what="has gone")
+    owner.house.run(20)
+    owner.house.watch.graph_seen([gone])
+    assert [kinds(n) for n in owner.run(300)] == [[Kind.BRIDGE_GONE]]
+
+
+def test_several_of_the_graph_are_one_notice():
+    owner = Owner(House(1))
+    found = [
+        Finding(fault=Fault.STRANGE_NODE, subject=f"node /n{i}", what="runs on 10.0.0.9, a machine that it is not")
+        for i in range(3)
+    ]
+    owner.house.watch.graph_seen(found)
+    (notice,) = owner.run(30)
+    assert notice.subject == "rosbot patrol: 3 things are wrong with the guard's network"
+    assert notice.text.count("What to do") == 1

@@ -56,7 +56,9 @@ class PatrolInputs:
         wake: Callable[[], None],
     ) -> None:
         self.on_boxes: Callable[[float, Sequence[Box]], None] = lambda stamp, boxes: None
+        self.on_sensor: Callable[[], None] = lambda: None
         self.calls = calls
+        self._calls_link: rospy.Subscriber | None = None
         self._senses, self._sensor_rooms, self._wake = senses, sensor_rooms, wake
         self._battery_topic = params.battery_topic
         self._requests: deque[Request] = deque()
@@ -76,16 +78,25 @@ class PatrolInputs:
 
     def start(self) -> None:
         """Start the subscribers."""
-        rospy.Subscriber("motion_trigger", EspTrigger, self._on_trigger, queue_size=100, tcp_nodelay=True)
+        self.listen()
         rospy.Subscriber("sensors/events", SensorEvent, self._on_sensor_event, queue_size=100)
         rospy.Subscriber("darknet_ros/bounding_boxes", BoundingBoxes, self._on_boxes, queue_size=10)
         rospy.Subscriber("darknet_ros/found_object", ObjectCount, self._on_count, queue_size=10)
         rospy.Subscriber("scan", LaserScanMsg, self._on_scan, queue_size=1, buff_size=1 << 18)
         rospy.Subscriber(self._battery_topic, BatteryState, self._on_battery, queue_size=1)
 
+    def listen(self) -> None:
+        """Listen to the motion sensors; called again, it asks the master anew who speaks."""
+        if self._calls_link is not None:
+            self._calls_link.unregister()
+        self._calls_link = rospy.Subscriber(
+            "motion_trigger", EspTrigger, self._on_trigger, queue_size=100, tcp_nodelay=True
+        )
+
     # -- callbacks keep
 
     def _on_trigger(self, message: EspTrigger) -> None:
+        self.on_sensor()
         if not message.move:
             return  # a heartbeat
         sender, is_latched = sender_of(message), _is_latched(message)

@@ -151,7 +151,10 @@ class PatrolNode:
         self.inputs = self._make_inputs(inputs, rooms, Journal(folder / "calls.jsonl", self.store.taken))
         self.inputs.on_boxes = self._note_sighting
         self.missed = MissedCalls(folder / "alive", self.inputs.ask, self.inputs.room_of)
-        self.neighbour = Neighbour(self.params.sensor_watch_after, self.params.sensor_watch_notice_after, self.health)
+        self.neighbour = Neighbour(
+            self.params.sensor_watch_after, self.params.sensor_watch_notice_after, self.health, self.inputs.listen
+        )
+        self.inputs.on_sensor = self.neighbour.hearing.heard
         self.markers = PeopleMarkers(inputs.map_frame)
         self._shown = ""
         self._is_over = False

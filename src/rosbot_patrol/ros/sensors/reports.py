@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterable
+
 import rospy
 
 from rosbot_patrol.counts import count_of
+from rosbot_patrol.graph.judge import Fault, Finding
 from rosbot_patrol.msg import SensorEvent, SensorState, SensorStates
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, STALE, WARN, Health
 from rosbot_patrol.sensors.looks import Look
-from rosbot_patrol.sensors.problems import SERIOUS, Event, Kind, duration
+from rosbot_patrol.sensors.problems import OF_GRAPH, SERIOUS, Event, Kind, duration
 from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
+
+log = logging.getLogger(__name__)
 
 
 def state_name(status: SensorStatus) -> str:
@@ -122,6 +128,7 @@ class Reports:
     def __init__(self, health: Health) -> None:
         self._health = health
         self._parts: set[str] = set()
+        self._network = ""
 
     def update(self, statuses: list[SensorStatus], watch: Supervisor) -> None:
         """Set the entries to the current states."""
@@ -137,6 +144,17 @@ class Reports:
             self._health.drop(part)
         self._parts = parts
         self._health.set("", *summary(statuses, watch))
+
+    def update_graph(self, watch: Supervisor, findings: Iterable[Finding]) -> None:
+        """Set the two entries about the graph: what is wrong in it, and whether others can reach it."""
+        wrong = [f"{watch.title(key)} {p.what}" for key, p in watch.problems().items() if key.kind in OF_GRAPH]
+        self._health.set("graph", ERROR if wrong else OK, "; ".join(wrong) or "as it should be")
+        found = next((each for each in findings if each.fault is Fault.GRAPH_OPEN), None)
+        what = f"{found.subject} {found.what}; scripts/secure closes it" if found else "no other machine can command it"
+        if what != self._network and found:
+            log.warning("%s (docs/security.md)", what)
+        self._network = what
+        self._health.set("network", WARN if found else OK, what)
 
     def _sensor(self, status: SensorStatus, watch: Supervisor) -> str:
         spec = watch.sensors.find(status.sensor_id)

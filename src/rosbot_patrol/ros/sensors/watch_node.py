@@ -1,4 +1,4 @@
-"""sensor_watch: supervises the motion sensors; reports a faulty one on its topics and to the owner.
+"""sensor_watch: supervises the motion sensors and the ROS graph; reports what is wrong on its topics and to the owner.
 
 It subscribes to /motion_trigger from any publisher, to the bridges' /sensors/links and to the patrol's /patrol/alive: a
 dead or hanging patrol cannot report itself. The patrol's /patrol/arming lists the guarded rooms; without that message,
@@ -41,6 +41,7 @@ from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node, sender
 from rosbot_patrol.ros.runtime.private_files import keep_private
 from rosbot_patrol.ros.runtime.process import start_anew
 from rosbot_patrol.ros.runtime.state_folder import state_folder
+from rosbot_patrol.ros.sensors.graph_reader import GraphParams, GraphReader
 from rosbot_patrol.ros.sensors.reports import Reports, event_to_msg, look_to_msg, states_to_msg
 from rosbot_patrol.sensors.looks import Looks
 from rosbot_patrol.sensors.notices import Notices, SensorReport
@@ -70,7 +71,7 @@ class SensorWatchParams:
     )
 
 
-GROUPS = (SensorWatchParams, WatchTimes, NoticeTimes, LookTimes, MailParams)
+GROUPS = (SensorWatchParams, WatchTimes, NoticeTimes, LookTimes, MailParams, GraphParams)
 
 
 def load_group(cls: type, tree: Mapping[str, Any]) -> Any:
@@ -129,6 +130,7 @@ class SensorWatch:
         )
         self._looks = Looks(load_group(LookTimes, tree))
         self._reports = Reports(self._health)
+        self._graph = GraphReader(load_group(GraphParams, tree))
         self._unwritten = False
         self._retry_at = 0.0
         named = f"{count_of(len(sensors), 'sensor')} of {sensors.source}"
@@ -148,6 +150,7 @@ class SensorWatch:
         rospy.Subscriber("patrol/arming", ArmingMsg, self._on_arming, queue_size=10)
         rospy.Subscriber("sensors/links", SensorLinks, self._on_links, queue_size=100)
         self._post.start()
+        self._graph.start()
         Worker(self._work, name="watch").start()
         rospy.spin()
 
@@ -195,6 +198,7 @@ class SensorWatch:
 
     def _step(self, count: int) -> None:
         self._take()
+        self._watch.graph_seen(self._graph.findings)
         events = self._watch.tick(time.monotonic())
         for event in events:
             is_bad = event.active and event.problem.key.kind in SERIOUS
@@ -204,6 +208,7 @@ class SensorWatch:
             return
         statuses = self._watch.statuses()
         self._reports.update(statuses, self._watch)
+        self._reports.update_graph(self._watch, self._graph.findings)
         if events or not count % STATES_EVERY:
             self._states.publish(states_to_msg(statuses, self._watch))
         self._tell_owner(statuses)

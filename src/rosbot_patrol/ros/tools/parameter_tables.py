@@ -55,6 +55,7 @@ from rosbot_patrol.ros.drivers.wheel_odometry_node import WheelOdometryParams
 from rosbot_patrol.ros.gmapping.explore_node import ExploreParams
 from rosbot_patrol.ros.maps.server_node import MapServerParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
+from rosbot_patrol.ros.sensors.graph_reader import GraphParams
 from rosbot_patrol.ros.sensors.watch_node import SensorWatchParams
 from rosbot_patrol.ros.simulator.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.simulator.node import SimulatorParams
@@ -124,7 +125,14 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ("serial_node.py", [("", SerialNodeParams)]),
     (
         "sensor_watch",
-        [("", SensorWatchParams), ("", WatchTimes), ("", NoticeTimes), ("", LookTimes), ("", MailParams)],
+        [
+            ("", SensorWatchParams),
+            ("", WatchTimes),
+            ("", NoticeTimes),
+            ("", LookTimes),
+            ("", GraphParams),
+            ("", MailParams),
+        ],
     ),
     ("twist_mux", [("", TwistMuxParams)]),
     ("rplidarNode", [("", RplidarParams)]),
