@@ -5,8 +5,9 @@
 namespace patrol {
 namespace {
 
-const char kSensorText[] = "rosbot_patrol sensor v1";
-const char kBridgeText[] = "rosbot_patrol bridge v1";
+const char kSensorText[] = "rosbot_patrol sensor v2";
+const char kBridgeText[] = "rosbot_patrol bridge v2";
+const char kSessionText[] = "rosbot_patrol session v2";
 
 void digest(const uint8_t* key, const char* text, size_t text_size, const uint8_t* first, size_t first_size,
             const uint8_t* second, size_t second_size, uint8_t sensor_id, uint8_t* out) {
@@ -30,7 +31,7 @@ int hexDigit(char c) {
 bool KeyProof::answer(const uint8_t key[kKeySize], uint8_t sensor_id, const uint8_t* challenge, size_t size,
                       const uint8_t device_nonce[kDeviceNonceSize], uint8_t proof[kProofSize]) {
   asked_ = false;
-  if (size != kChallengeSize || challenge[0] != kProofVersion) return false;
+  if (size != kChallengeSize || challenge[0] != kChallengeVersion) return false;
   const uint8_t* server_nonce = challenge + 1;
   proof[0] = kProofVersion;
   proof[1] = sensor_id;
@@ -39,6 +40,8 @@ bool KeyProof::answer(const uint8_t key[kKeySize], uint8_t sensor_id, const uint
          sensor_id, proof + 2 + kDeviceNonceSize);
   digest(key, kBridgeText, sizeof(kBridgeText) - 1, device_nonce, kDeviceNonceSize, server_nonce, kServerNonceSize,
          sensor_id, expected_);
+  digest(key, kSessionText, sizeof(kSessionText) - 1, server_nonce, kServerNonceSize, device_nonce, kDeviceNonceSize,
+         sensor_id, session_);
   asked_ = true;
   return true;
 }

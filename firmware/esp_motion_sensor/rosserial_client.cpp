@@ -10,6 +10,7 @@ constexpr uint64_t kSyncTimeout = 11000;
 constexpr uint64_t kNegotiationTimeout = 15000;  // upstream's server asks after 2.1 s, and again every 15 s
 constexpr uint64_t kFrameTimeout = 1000;         // a frame that stalls for longer is given up
 constexpr size_t kMaxLog = 160;
+constexpr size_t kMaxPayload = 256;  // longest data of a frame that is sent
 
 /** Serialise a message as ROS 1 does; remember whether it fitted. */
 class Writer {
@@ -116,7 +117,16 @@ void RosserialClient::sent(size_t count) {
   memmove(output_, output_ + count, output_size_);
 }
 
-void RosserialClient::frame(const Frame& frame, uint64_t now) {
+void RosserialClient::frame(const Frame& received, uint64_t now) {
+  Frame frame = received;
+  if (proven_ && frame.topic_id != kTopicChallenge && frame.topic_id != kTopicProof) {
+    if (!from_bridge_.isNext(frame.topic_id, frame.data, frame.size)) {
+      fail("somebody in between has changed what the bridge says");
+      return;
+    }
+    from_bridge_.advance();
+    frame.size -= kSignatureSize;
+  }
   switch (frame.topic_id) {
     case kTopicPublisher:
       topicsAsked(now);
@@ -171,10 +181,14 @@ void RosserialClient::challenged(const Frame& frame) {
     fail("the bridge wants a key, and this sensor has none (SENSOR_KEY in secrets.h)");
     return;
   }
+  if (proven_) {
+    fail("the bridge asks for the key a second time");
+    return;
+  }
   uint8_t nonce[kDeviceNonceSize];
   uint8_t proof[kProofSize];
   random_.fill(nonce, sizeof(nonce));
-  proven_ = configured_ = false;
+  configured_ = false;
   if (!proof_.answer(identity_.key, identity_.sensor_id, frame.data, frame.size, nonce, proof)) {
     fail("the bridge's challenge is of an unknown version");
     return;
@@ -184,14 +198,28 @@ void RosserialClient::challenged(const Frame& frame) {
 }
 
 void RosserialClient::bridgeProof(const Frame& frame) {
-  if (!challenged_) return;
+  if (!challenged_ || proven_) return;
   proven_ = proof_.bridgeProves(frame.data, frame.size);
-  if (!proven_) fail("the bridge's proof is wrong: not our bridge, or another key");
+  if (!proven_) {
+    fail("the bridge's proof is wrong: not our bridge, or another key");
+    return;
+  }
+  from_sensor_.begin(proof_.session(), "from the sensor");
+  from_bridge_.begin(proof_.session(), "from the bridge");
 }
 
 bool RosserialClient::put(uint16_t topic_id, const uint8_t* data, size_t size) {
+  uint8_t payload[kMaxPayload + kSignatureSize];
+  if (proven_) {
+    if (size > kMaxPayload) return false;
+    memcpy(payload, data, size);
+    from_sensor_.sign(topic_id, data, size, payload + size);
+    data = payload;
+    size += kSignatureSize;
+  }
   const size_t written = encodeFrame(topic_id, data, size, output_ + output_size_, sizeof(output_) - output_size_);
   output_size_ += written;
+  if (proven_ && written > 0) from_sensor_.advance();
   return written > 0;
 }
 

@@ -9,6 +9,7 @@
 
 #include "key_proof.h"
 #include "rosserial_frame.h"
+#include "signed_frames.h"
 
 namespace patrol {
 
@@ -118,6 +119,8 @@ class RosserialClient {
   RandomSource& random_;
   FrameParser parser_;
   KeyProof proof_;
+  SignedFrames from_sensor_;  // used once the bridge is proven
+  SignedFrames from_bridge_;
   bool configured_ = false;
   bool challenged_ = false;
   bool proven_ = false;

@@ -53,7 +53,8 @@ Bytes challenge() {
   return frame(8, data);
 }
 
-const char kBridgeProof[] = "01 d838b779447b377af074bdc8eee33acbba5d28ac001ae2d905844ce75ff56764";
+const char kBridgeProof[] = "02 3bda6f94d7a86a73d4b6692ea8e48fe279a180594880f7924cbf532de9a6e5b8";
+const Bytes kSignedTopics = frame(0, bytes("00000000 eaca673a806cb10d"));
 const Bytes kTime = frame(10, bytes("00 e1 f5 05 00 65 cd 1d"));  // 100000000.5 s
 
 std::string spaceless(const char* text) { return unit::hex(bytes(text)); }
@@ -215,23 +216,50 @@ TEST(the_key_is_proved_before_the_topics) {
   peer.tell(challenge(), 10);
   const std::string said = peer.said();
   EQUAL(said.substr(0, 14), "fffe3200cd0900");
-  EQUAL(said.substr(14, 36), "0105" + std::string(32, '2'));
+  EQUAL(said.substr(14, 36), "0205" + std::string(32, '2'));
   EQUAL(said.size(), 2 * (50 + patrol::kFrameOverhead));
   CHECK(!peer.client.bridgeProven());
   peer.tell(frame(9, bytes(kBridgeProof)), 20);
   CHECK(peer.client.bridgeProven());
   EQUAL(peer.said(), "");
-  peer.tell(kTopics, 30);
+  peer.tell(kSignedTopics, 30);
   CHECK(peer.client.configured());
 }
 
-TEST(a_new_challenge_needs_a_new_proof) {
+TEST(after_the_proof_each_frame_is_signed) {
+  Peer peer(true, true);
+  peer.tell(challenge(), 10);
+  peer.tell(frame(9, bytes(kBridgeProof)), 20);
+  peer.said();
+  peer.tell(kSignedTopics, 30);
+  const std::string said = peer.said();  // the time request is frame 0, the topic frame 1
+  EQUAL(said.size(), 2 * (8 + 8 + 12) + spaceless(kTopicInfo).size() + 2 * 12);
+  EQUAL(said.substr(2 * (7 + 8), 8), "00000000");
+  const uint8_t message[2] = {5, 1};
+  CHECK(peer.client.publish(message, 2));
+  EQUAL(peer.said().substr(2 * 9, 8), "02000000");
+}
+
+TEST(what_somebody_adds_or_repeats_ends_the_connection) {
+  for (const Bytes& wrong : {bytes(kTopics), kSignedTopics, frame(11, Bytes(12, 0)), frame(10, Bytes(20, 0))}) {
+    Peer peer(true, true);
+    peer.tell(challenge(), 10);
+    peer.tell(frame(9, bytes(kBridgeProof)), 20);
+    peer.tell(kSignedTopics, 30);
+    CHECK(peer.client.configured());
+    peer.tell(wrong, 40);
+    EQUAL(peer.fault(), "somebody in between has changed what the bridge says");
+    CHECK(!peer.client.configured());
+  }
+}
+
+TEST(a_second_challenge_ends_the_connection) {
   Peer peer(true, true);
   peer.tell(challenge(), 10);
   peer.tell(frame(9, bytes(kBridgeProof)), 20);
   peer.tell(challenge(), 30);
-  CHECK(!peer.client.bridgeProven());
-  peer.tell(kTopics, 40);
+  EQUAL(peer.fault(), "the bridge asks for the key a second time");
+  peer.tell(kSignedTopics, 40);
   CHECK(!peer.client.configured());
 }
 
@@ -256,7 +284,7 @@ TEST(who_insists_talks_to_no_bridge_without_proof) {
   Peer whole(true, true);
   whole.tell(challenge(), 10);
   whole.tell(frame(9, bytes(kBridgeProof)), 20);
-  whole.tell(kTopics, 30);
+  whole.tell(kSignedTopics, 30);
   CHECK(whole.fault().empty() && whole.client.configured());
 }
 

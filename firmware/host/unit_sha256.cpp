@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "key_proof.h"
+#include "signed_frames.h"
 #include "sha256.h"
 #include "unit.h"
 
@@ -77,8 +78,8 @@ TEST(proof_has_the_agreed_form) {
   patrol::KeyProof exchange;
   CHECK(exchange.answer(key.data(), 5, challenge.data(), challenge.size(), nonce.data(), proof.data()));
   EQUAL(unit::hex(proof),
-        "0105" + unit::hex(nonce) + "81ca4be99dc5c04aa35b1706fcf09c16d9b9150a6f0e60ce4580008279bc6cbf");
-  Bytes answer = bytes("01 d838b779447b377af074bdc8eee33acbba5d28ac001ae2d905844ce75ff56764");
+        "0205" + unit::hex(nonce) + "42a4137469b20eae63c41aa9b703d54557a36aaa1ac554f672c8509684ff254a");
+  Bytes answer = bytes("02 3bda6f94d7a86a73d4b6692ea8e48fe279a180594880f7924cbf532de9a6e5b8");
   CHECK(exchange.bridgeProves(answer.data(), answer.size()));
   for (size_t i = 0; i < answer.size(); ++i) {
     Bytes wrong = answer;
@@ -86,8 +87,38 @@ TEST(proof_has_the_agreed_form) {
     CHECK(!exchange.bridgeProves(wrong.data(), wrong.size()));
   }
   CHECK(!exchange.bridgeProves(answer.data(), answer.size() - 1));
+  EQUAL(unit::hex(Bytes(exchange.session(), exchange.session() + patrol::kDigestSize)),
+        "5660dc9739593224577cc41ea034220e935d18e98f16fe8e193817b78090dbf2");
   exchange.clear();
   CHECK(!exchange.bridgeProves(answer.data(), answer.size()));
+}
+
+TEST(frames_are_signed_in_the_agreed_form) {
+  const Bytes session = bytes("5660dc9739593224577cc41ea034220e935d18e98f16fe8e193817b78090dbf2");
+  const Bytes data = {5, 1};
+  patrol::SignedFrames sender, receiver, other;
+  sender.begin(session.data(), "from the sensor");
+  receiver.begin(session.data(), "from the sensor");
+  other.begin(session.data(), "from the bridge");
+  Bytes payload = data;
+  payload.resize(data.size() + patrol::kSignatureSize);
+  sender.sign(125, data.data(), data.size(), payload.data() + data.size());
+  EQUAL(unit::hex(payload), "0501" "0000000078503205e6fc32a6");
+  CHECK(receiver.isNext(125, payload.data(), payload.size()));
+  CHECK(!receiver.isNext(126, payload.data(), payload.size()));
+  CHECK(!other.isNext(125, payload.data(), payload.size()));
+  for (size_t i = 0; i < payload.size(); ++i) {
+    Bytes wrong = payload;
+    wrong[i] = static_cast<uint8_t>(wrong[i] ^ 0x10);
+    CHECK(!receiver.isNext(125, wrong.data(), wrong.size()));
+    CHECK(!receiver.isNext(125, payload.data(), i));
+  }
+  receiver.advance();
+  CHECK(!receiver.isNext(125, payload.data(), payload.size()));  // the same frame again
+  sender.advance();
+  sender.sign(125, data.data(), data.size(), payload.data() + data.size());
+  EQUAL(unit::hex(payload), "0501" "0100000057d1152f7f441e7c");
+  CHECK(receiver.isNext(125, payload.data(), payload.size()));
 }
 
 TEST(challenges_of_another_form_are_not_answered) {

@@ -12,7 +12,7 @@ from test_server import serving, wait_for
 
 from rosbot_patrol.rosserial.device.tcp_client import EspClient
 from rosbot_patrol.rosserial.protocol.packet import encode
-from rosbot_patrol.rosserial.protocol.proof import Prover
+from rosbot_patrol.rosserial.protocol.proof import VERSION, Prover
 from rosbot_patrol.rosserial.server.admission import Limits
 from rosbot_patrol.rosserial.server.policy import Policy, parse_sensors
 
@@ -67,7 +67,7 @@ def test_a_stranger_before_a_bridge_with_keys(name, caplog):
 def test_a_replayed_proof_and_one_for_another_id(caplog):
     with house(Policy(keys=KEYS)) as (recorder, _, port):
         honest = Stranger(port, "127.0.0.2")
-        overheard = Prover(2, KEYS[2]).answer(attacks.challenge_of(honest))
+        overheard = Prover(2, KEYS[2], VERSION).answer(attacks.challenge_of(honest))
         honest.say(overheard)
         assert honest.hear()[5:6] == b"\x09"  # so it was a good one
         attacks.false_proofs(port, SOURCE, 0.5, overheard, KEYS[2])

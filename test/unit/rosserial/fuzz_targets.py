@@ -233,7 +233,7 @@ def check_event(session: Session, policy: Policy, event: Event, proven: int | No
 def device(data: bytes) -> None:
     """Nothing crashes a device's session, and one that insists tells nothing to a bridge without the key."""
     tape = Tape(data)
-    prover = proof.Prover(2, KEY) if tape.byte() & 1 else None
+    prover = proof.Prover(2, KEY, proof.VERSION) if tape.byte() & 1 else None
     insist = prover is not None and tape.byte() & 1 == 1
     led = TopicInfo(topic_id=100, name="led", message_type="std_msgs/Bool", md5="x")
     session = DeviceSession([ESP], [led], prover=prover, insist=insist)
@@ -278,7 +278,7 @@ def both(data: bytes) -> None:
 
 
 def connect(policy: Policy, now: float) -> tuple[Session, DeviceSession]:
-    return Session(policy, now, nonce=NONCE), DeviceSession([ESP], prover=proof.Prover(2, KEY))
+    return Session(policy, now, nonce=NONCE), DeviceSession([ESP], prover=proof.Prover(2, KEY, proof.VERSION))
 
 
 def answer(session: Session, events: list[Event]) -> None:

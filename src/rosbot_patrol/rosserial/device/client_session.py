@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.protocol.packet import Packet, Parser, encode
 from rosbot_patrol.rosserial.protocol.proof import Prover
+from rosbot_patrol.rosserial.protocol.signed import FROM_BRIDGE, FROM_SENSOR, OVERHEAD, Checker, Signer
 from rosbot_patrol.rosserial.protocol.topics import (
     TopicId,
     TopicInfo,
@@ -92,6 +93,8 @@ class DeviceSession:
         self._prover = prover
         self._is_trusted = not insist
         self._awaits_answer = False
+        self._signer: Signer | None = None
+        self._checker: Checker | None = None
         self._offset: float | None = None
         self.configured = False
 
@@ -153,7 +156,7 @@ class DeviceSession:
     def take_output(self) -> list[bytes]:
         """Frames to send, each in one piece."""
         frames, self._output = self._output, []
-        return frames
+        return [self._signer.sign(frame) if self._signer is not None else frame for frame in frames]
 
     def _packets(self, packets: list[Packet], now: float) -> list[DeviceEvent]:
         return [event for packet in packets for event in self._packet(packet, now)]
@@ -163,6 +166,11 @@ class DeviceSession:
             return self._prove(packet)
         if not self._is_trusted:
             return [NotTrusted("the bridge did not show that it has this sensor's key")]
+        if self._checker is not None:
+            try:
+                packet = Packet(packet.topic_id, self._checker.check(packet.topic_id, packet.data))
+            except ProtocolError as err:
+                return [NotTrusted(f"somebody in between has changed what the bridge says: {err.problem}")]
         if packet.topic_id == TopicId.PUBLISHER:
             return self._negotiate(now)
         if packet.topic_id == TopicId.TIME:
@@ -185,7 +193,13 @@ class DeviceSession:
             if not self._prover.confirms(packet.data):
                 return [NotTrusted("the bridge does not have this sensor's key")]
             self._is_trusted, self._awaits_answer = True, False
+            if self._prover.session is not None and self._checker is None:
+                self._parser.max_payload += OVERHEAD
+                self._checker = Checker(self._prover.session, FROM_BRIDGE)
+                self._signer = Signer(self._prover.session, FROM_SENSOR)
             return []
+        if self._checker is not None:
+            return [NotTrusted("the bridge asks for the key a second time")]
         try:
             self._output.append(self._prover.answer(packet.data))
             self._awaits_answer = True

@@ -64,6 +64,7 @@ class Client:
         self._sensor_ids: set[int] = set()
         self._waiting: deque[bytes] = deque()
         self._waiting_bytes = 0
+        self._is_begun = False  # the first frame that waits has its signature, and may be partly sent
         self._sent = 0
         self._last_sent = (-1, 0.0)  # bytes sent, and when that number was first seen
         self._lock = threading.Lock()
@@ -133,6 +134,11 @@ class Client:
             return
         with self._lock:
             while self._waiting:
+                if not self._is_begun:
+                    plain = self._waiting[0]
+                    self._waiting[0] = self.session.sign(plain)
+                    self._waiting_bytes += len(self._waiting[0]) - len(plain)
+                    self._is_begun = True
                 frame = self._waiting[0]
                 try:
                     sent = self.link.send(frame)
@@ -144,6 +150,7 @@ class Client:
                     self._waiting[0] = frame[sent:]
                     return
                 self._waiting.popleft()
+                self._is_begun = False
 
     def _queue(self, frame: bytes) -> None:
         with self._lock:

@@ -125,16 +125,20 @@ class Dispatcher:
                 client, logging.WARNING, now, "silent for %.0f s, asking for its topics again", event.seconds
             )
         elif isinstance(event, Proven):
-            self._proven(client, event.sensor_id, now)
+            self._proven(client, event, now)
         elif isinstance(event, HangUp) and event.is_refusal:
             self._journal.refuse(client, event.reason, now)
             self._hang_up(client, None)
         elif isinstance(event, HangUp):
             self._hang_up(client, f"hung up on: {event.reason}")
 
-    def _proven(self, client: Client, sensor_id: int, now: float) -> None:
+    def _proven(self, client: Client, proof: Proven, now: float) -> None:
+        sensor_id = proof.sensor_id
         if self._door.prove(client, sensor_id):
             self._journal.say(client, logging.INFO, now, "proved to be sensor %d", sensor_id)
+            if not proof.is_signed and self._journal.is_new((client.address, "unsigned", sensor_id), now):
+                told = "sensor %d has older firmware: what it says is not signed (docs/sensors.md, Keys)"
+                self._journal.say(client, logging.WARNING, now, told, sensor_id)
         else:
             self._journal.refuse(client, f"one more connection of sensor {sensor_id}; is its key known to others?", now)
             self._hang_up(client, None)

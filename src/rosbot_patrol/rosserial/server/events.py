@@ -69,9 +69,10 @@ class SyncLost:
 
 @dataclass(frozen=True)
 class Proven:
-    """The device has proved that it has the key of that sensor."""
+    """The device has proved that it has the key of that sensor; `is_signed`: and signs each frame from now on."""
 
     sensor_id: int
+    is_signed: bool = False
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.protocol import proof
 from rosbot_patrol.rosserial.protocol.packet import Packet, Parser, encode
+from rosbot_patrol.rosserial.protocol.signed import FROM_BRIDGE, FROM_SENSOR, OVERHEAD, Checker, Signer
 from rosbot_patrol.rosserial.protocol.topics import (
     ESP_TRIGGER_MD5,
     ESP_TRIGGER_TYPES,
@@ -78,6 +79,8 @@ class Session:
         self.cost = 0.0
         self.clock_offset: float | None = None
         self._claimed = 0.0
+        self._signer: Signer | None = None
+        self._checker: Checker | None = None
         self._gate = proof.Gate(policy.keys, nonce) if policy.keys else None
         self._is_turned_away = False
         self._began = now
@@ -123,6 +126,10 @@ class Session:
     def has_output(self) -> bool:
         """Whether there are frames to send."""
         return bool(self._output)
+
+    def sign(self, frame: bytes) -> bytes:
+        """A frame as it goes on the wire, which must be the next to leave: signed, where the device signs, too."""
+        return self._signer.sign(frame) if self._signer is not None else frame
 
     def take_output(self) -> list[bytes]:
         """Frames to send, each in one piece."""
@@ -214,7 +221,15 @@ class Session:
     def _packet(self, packet: Packet, now: float) -> list[Event]:
         if self._gate is not None:
             return self._before_proof(self._gate, packet, now)
+        if self._is_turned_away:
+            return []
         topic_id = packet.topic_id
+        if self._checker is not None:
+            try:
+                packet = Packet(topic_id, self._checker.check(topic_id, packet.data))
+            except ProtocolError as err:
+                self._is_turned_away = True
+                return [HangUp(f"somebody in between has changed what the sensor says: {err.problem}", is_refusal=True)]
         known = self.incoming.get(topic_id)
         if known is not None:
             if topic_id in self._triggers and not self._voice.may_say(packet.data):
@@ -249,9 +264,12 @@ class Session:
             return [HangUp(reason, is_refusal=True)]
         self._gate = None
         self.parser.max_payload = self.policy.max_payload
+        if gate.session is not None:
+            self.parser.max_payload += OVERHEAD
+            self._signer, self._checker = Signer(gate.session, FROM_BRIDGE), Checker(gate.session, FROM_SENSOR)
         self._output.append(answer)
         self._request_topics(now)
-        return [Proven(sensor_id)]
+        return [Proven(sensor_id, is_signed=gate.session is not None)]
 
     def _announce(self, kind: TopicId, info: TopicInfo) -> list[Event]:
         known = self.incoming if kind in INCOMING else self.outgoing

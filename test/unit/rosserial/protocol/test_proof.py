@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rosbot_patrol.rosserial.device.client_session import Configured, DeviceSession, NotTrusted
 from rosbot_patrol.rosserial.protocol.packet import Parser, encode
-from rosbot_patrol.rosserial.protocol.proof import Gate, Prover
+from rosbot_patrol.rosserial.protocol.proof import VERSION, Gate, Prover
 from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, REQUEST_TOPICS, TopicId, TopicInfo, pack_topic_info
 from rosbot_patrol.rosserial.server.events import Announced, HangUp, Proven, Received, Refused
 from rosbot_patrol.rosserial.server.policy import Policy
@@ -31,7 +31,7 @@ def keyed(nonce=SERVER_NONCE, policy=POLICY):
 
 
 def test_frames_of_both_sides_are_those_of_openssl():
-    gate, prover = Gate(POLICY.keys, SERVER_NONCE), Prover(2, KEY)
+    gate, prover = Gate(POLICY.keys, SERVER_NONCE), Prover(2, KEY, VERSION)
     assert gate.challenge == encode(8, b"\x01" + SERVER_NONCE)
     assert prover.answer(b"\x01" + SERVER_NONCE, DEVICE_NONCE) == PROOF
     assert len(PROOF) == 8 + 50
@@ -70,7 +70,7 @@ def test_nothing_is_told_before_the_proof():
         (Prover(2, KEY).answer(b"\x01" + bytes(32)), "a wrong proof for sensor 2"),
         (Prover(7, KEY).answer(b"\x01" + SERVER_NONCE), "sensor 7, which has no key here"),
         (Prover(7, bytes(32)).answer(b"\x01" + SERVER_NONCE), "sensor 7, which has no key here"),
-        (encode(9, b"\x02" + PROOF[8:-1]), "no proof of version 1"),
+        (encode(9, b"\x03" + PROOF[8:-1]), "no proof of version 1"),
         (encode(9, b""), "0 bytes that are no proof"),
         (encode(9, PROOF[7:-2]), "49 bytes that are no proof"),
         (encode(9, b"\x01" + bytes.fromhex(BRIDGE_MAC)), "33 bytes that are no proof"),
@@ -93,7 +93,7 @@ def test_an_overheard_proof_is_worth_nothing_on_another_connection():
     challenges = [Parser().feed(it.take_output()[0])[0].data for it in (first, second)]
     assert challenges[0] != challenges[1]
     proof = Prover(2, KEY).answer(challenges[0])
-    assert first.receive(proof, 0.1) == [Proven(2)]
+    assert first.receive(proof, 0.1) == [Proven(2, is_signed=True)]
     (event,) = second.receive(proof, 0.1)
     assert isinstance(event, HangUp)
 
@@ -125,7 +125,7 @@ def talk(server, device):
     """Carry frames to and fro until there are no more; return the events of both."""
     of_server, of_device = [], []
     for now in (0.1, 0.2, 0.3, 0.4):
-        of_device += device.receive(b"".join(server.take_output()), now)
+        of_device += device.receive(b"".join(map(server.sign, server.take_output())), now)
         of_server += server.receive(b"".join(device.take_output()), now)
     return of_server, of_device
 
@@ -133,7 +133,7 @@ def talk(server, device):
 def test_device_with_a_key_and_bridge_with_keys():
     server, device = keyed(), DeviceSession([ESP], prover=Prover(2, KEY), insist=True)
     of_server, of_device = talk(server, device)
-    assert of_server[0] == Proven(2)
+    assert of_server[0] == Proven(2, is_signed=True)
     assert of_device == [Configured()]
     assert server.configured
     assert device.closed() == []

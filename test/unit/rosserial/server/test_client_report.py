@@ -1,7 +1,7 @@
 """What /diagnostics is told of clients: faults first, and bounded whatever number there is."""
 
 from rosbot_patrol.rosserial.protocol.packet import encode
-from rosbot_patrol.rosserial.protocol.proof import Prover
+from rosbot_patrol.rosserial.protocol.proof import VERSION, Prover
 from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_topic_info
 from rosbot_patrol.rosserial.server.client import Client
 from rosbot_patrol.rosserial.server.policy import Policy
@@ -36,7 +36,7 @@ def test_what_is_wrong_with_a_client():
     keyed = client(1, Policy(keys={1: KEY}), announces=False, nonce=bytes(32))
     assert look_at(keyed, 1.0).text == "has not proved itself"
     assert look_at(keyed, 1.0).values["proven"] == "no"
-    keyed.session.receive(Prover(1, KEY).answer(b"\x01" + bytes(32)), 1.0)
+    keyed.session.receive(Prover(1, KEY, VERSION).answer(b"\x01" + bytes(32)), 1.0)
     keyed.session.receive(ANNOUNCE, 1.0)
     assert look_at(keyed, 1.0).level is Level.OK
     assert look_at(keyed, 1.0).values["proven"] == "yes"

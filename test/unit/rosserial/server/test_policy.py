@@ -4,7 +4,7 @@ import pytest
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.rosserial.protocol.packet import encode
-from rosbot_patrol.rosserial.protocol.proof import Prover
+from rosbot_patrol.rosserial.protocol.proof import VERSION, Prover
 from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_topic_info
 from rosbot_patrol.rosserial.server.events import Announced, HangUp, Received, Refused
 from rosbot_patrol.rosserial.server.policy import TRUSTED, Policy, parse_networks, parse_rules, parse_sensors
@@ -59,7 +59,7 @@ def test_a_peer_speaks_for_its_own_sensor_only():
 
 def test_the_list_holds_for_who_has_a_key_too():
     policy = Policy(keys={2: bytes(range(32))}, sensors=parse_sensors(["10.0.0.2 2"], ""))
-    proof = Prover(2, bytes(range(32))).answer(b"\x01" + bytes(32))
+    proof = Prover(2, bytes(range(32)), VERSION).answer(b"\x01" + bytes(32))
     elsewhere = Session(policy, 0.0, address="10.0.0.9", nonce=bytes(32))
     (event,) = elsewhere.receive(proof, 0.1)
     assert isinstance(event, HangUp)
