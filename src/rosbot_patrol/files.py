@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import errno
+import functools
+import hashlib
 import json
 import os
 from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.errors import StateError
 
+PACKAGE = Path(__file__).resolve().parent
 DISK_FULL = frozenset((errno.ENOSPC, errno.EDQUOT))  # errno of an OSError: no room on the disk, or in the user's quota
 
 
@@ -105,3 +109,21 @@ def cache_folder() -> Path:
         return Path(given)
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     return Path(base) / "rosbot_patrol"
+
+
+def kernel_sources() -> list[Path]:
+    """Files with kernels, sorted: every `*_kernels.py` below this package."""
+    return sorted(PACKAGE.rglob("*_kernels.py"))
+
+
+@functools.lru_cache(maxsize=1)
+def cache_dir() -> Path:
+    """Folder of the compiled kernels, named by a hash of numba's version and all kernel sources.
+
+    numba's `cache=True` does not notice changes of a callee in another module, and cannot write to a read-only install.
+    """
+    digest = hashlib.sha256(version("numba").encode())
+    for path in kernel_sources():
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return cache_folder() / f"numba-{digest.hexdigest()[:16]}"

@@ -1,43 +1,21 @@
-"""Decorator of all numba kernels, and the cache folder of their machine code.
+"""Decorator of all numba kernels; their machine code is kept in `files.cache_dir()`.
 
-numba's `cache=True` does not notice changes of a callee in another module, and cannot write to a read-only install.
-Therefore the name of the cache folder contains a hash of all kernel sources; it lies in `cache_folder()`.
 `python -m rosbot_patrol.kernels` compiles everything (the set-up does it); after that a node only loads at its start.
 """
 
 from __future__ import annotations
 
-import functools
-import hashlib
 import importlib
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 
-from rosbot_patrol.files import cache_folder
+from rosbot_patrol.files import PACKAGE, cache_dir, kernel_sources
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-_SOURCE = Path(__file__).resolve().parent
-
-
-def kernel_sources() -> list[Path]:
-    """Files with kernels, sorted: every `*_kernels.py` below this package."""
-    return sorted(_SOURCE.rglob("*_kernels.py"))
-
-
-@functools.lru_cache(maxsize=1)
-def cache_dir() -> Path:
-    """Folder of the compiled kernels for these sources and this numba version."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in kernel_sources():
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes())
-    return cache_folder() / f"numba-{digest.hexdigest()[:16]}"
 
 
 def kernel(*signatures: str, **options: Any) -> Callable[[F], F]:
@@ -65,7 +43,7 @@ def warm(say: Callable[[str], None] = print) -> float:
     start = time.perf_counter()
     sources = kernel_sources()
     for i, path in enumerate(sources, 1):
-        dotted = ".".join(("rosbot_patrol", *path.relative_to(_SOURCE).with_suffix("").parts))
+        dotted = ".".join(("rosbot_patrol", *path.relative_to(PACKAGE).with_suffix("").parts))
         before = time.perf_counter()
         importlib.import_module(dotted)
         say(f"  [{i}/{len(sources)}] {dotted}: {time.perf_counter() - before:.1f} s")

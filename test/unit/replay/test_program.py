@@ -11,7 +11,7 @@ from made_bag import write_bag
 from made_drive import drive_messages
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.kernels import cache_dir
+from rosbot_patrol.files import cache_dir
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.package_files import package_file
 from rosbot_patrol.replay import program

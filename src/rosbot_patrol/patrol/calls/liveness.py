@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 _EVERY = 1.0  # time between two signs of life [s]
+DOWN = 60.0  # a longer gap is no restart of the node [s]
 _SLACK = 0.3  # largest delay of clocks and messages [s]
 
 
@@ -19,17 +20,21 @@ class Vigil:
         most: longest gap that is evaluated [s].
 
     Attributes:
+        down: when the last sign of life was, if the gap is longer than a node's restart; seconds since 1970, else None.
         problem: reason why the file cannot be read or created, "" if it can; `step` keeps trying.
     """
 
     def __init__(self, path: Path, wall: float, most: float = 3600.0) -> None:
         self._path, self._began, self._touched = path, wall, -math.inf
         self._gone: float | None = None
+        self.down: float | None = None
         self.problem = ""
         try:
             gone = path.stat().st_mtime if path.exists() else -math.inf
             if 0.0 <= wall - gone <= most:  # else the gap is too long, or the clock was set
                 self._gone = gone
+            if DOWN <= wall - gone < math.inf:
+                self.down = gone
             self.step(wall)
         except OSError as err:
             self.problem = str(err)

@@ -33,7 +33,7 @@ from rosbot_patrol.ros.bridge.channels import DeviceService, ServiceCaller, Subs
 from rosbot_patrol.ros.bridge.links import LinkTeller
 from rosbot_patrol.ros.bridge.publishers import SETTLING, Publishers
 from rosbot_patrol.ros.bridge.report import Report, SerialTap
-from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node
+from rosbot_patrol.ros.runtime.node import Worker, load_params, private_params, run_node
 from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, unpack_esp_trigger
 from rosbot_patrol.rosserial.server.client import Client
 from rosbot_patrol.rosserial.server.complaints import Complaints
@@ -166,7 +166,7 @@ class RosSide:
 
 def _parameters() -> SerialNodeParams:
     """Private parameters, upstream's global ones and the arguments; the later ones take precedence."""
-    tree = dict(rospy.get_param("~", {}) or {})
+    tree = private_params()
     if "tcp_port" not in tree:
         tree["tcp_port"] = rospy.get_param(GLOBAL_TCP_PORT, DEFAULT_TCP_PORT)
     arguments = rospy.myargv()[1:]

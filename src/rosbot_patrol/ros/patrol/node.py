@@ -80,7 +80,7 @@ from rosbot_patrol.ros.patrol.settings import (
 from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.runtime.file_watch import FileWatch
-from rosbot_patrol.ros.runtime.node import Loop, now, run_node
+from rosbot_patrol.ros.runtime.node import Loop, now, private_params, run_node
 from rosbot_patrol.ros.runtime.private_files import keep_private
 from rosbot_patrol.ros.runtime.process import start_anew
 from rosbot_patrol.ros.runtime.state_folder import claim_folder, state_folder
@@ -95,7 +95,7 @@ class PatrolNode:
     """The node patrol_robot: inputs, one thread that steps the manager, outputs."""
 
     def __init__(self) -> None:
-        tree = rospy.get_param("~", {}) or {}
+        tree = private_params()
         refuse_passwords(tree)
         given, mail = load_flat(NodeParams, tree), load_flat(MailParams, tree)
         folder = state_folder(given.state_dir, rospy.get_namespace())
@@ -150,7 +150,7 @@ class PatrolNode:
         self._loop = Loop(self.params.rate, self._step, name="patrol")
         self.inputs = self._make_inputs(inputs, rooms, Journal(folder / "calls.jsonl", self.store.taken))
         self.inputs.on_boxes = self._note_sighting
-        self.missed = MissedCalls(folder / "alive", self.inputs.ask, self.inputs.room_of)
+        self.missed = MissedCalls(folder / "alive", self.inputs.ask, self.inputs.room_of, self._tell_owner)
         self.neighbour = Neighbour(
             self.params.sensor_watch_after, self.params.sensor_watch_notice_after, self.health, self.inputs.listen
         )

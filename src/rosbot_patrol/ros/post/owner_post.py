@@ -45,6 +45,7 @@ log = logging.getLogger(__name__)
 
 LOOK = 0.2  # time between checks of the folder for other programs' notices [s]
 HOUSEKEEPING = 2.0  # [s]
+STALLED = 15.0  # time without a check after which the post hangs [s]
 
 
 class OwnerPost:
@@ -85,6 +86,7 @@ class OwnerPost:
         self._has_other = False  # another program delivers
         self._failures = Repeats(60.0)
         self._seen_mtime = 0
+        self._passed_at = time.monotonic()
         self._housekept = float("-inf")
         self._network = network_mark()
         self._reporter = PostHealth(self._who, mail, self._dispatcher, health)
@@ -98,6 +100,11 @@ class OwnerPost:
     def is_written(self) -> bool:
         """Whether every notice put so far is on the disk."""
         return self._box.is_written
+
+    @property
+    def is_at_work(self) -> bool:
+        """Whether the thread that checks the outbox has done so lately."""
+        return time.monotonic() - self._passed_at < STALLED
 
     @property
     def is_disk_full(self) -> bool:
@@ -175,6 +182,7 @@ class OwnerPost:
 
     def _pass(self) -> float:
         """Check everything once; returns the time until the next check [s]."""
+        self._passed_at = time.monotonic()
         has_written, has_failed = False, False
         for part in (self._write, self._look, self._box.watch_recent, self._keep_house):
             try:

@@ -16,7 +16,8 @@ import rospy
 from rospy.core import is_shutdown_requested
 
 from rosbot_patrol import params
-from rosbot_patrol.errors import PatrolError
+from rosbot_patrol.errors import ParamError, PatrolError, StateError
+from rosbot_patrol.files import read_json
 from rosbot_patrol.ros.runtime import greeting, logs, single_links
 from rosbot_patrol.ros.runtime.by_hand import require_master
 from rosbot_patrol.ros.runtime.process import Priority, follow_restart, take
@@ -24,6 +25,13 @@ from rosbot_patrol.ros.runtime.process import Priority, follow_restart, take
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+SERVICE_PARAMS = "ROSBOT_PATROL_PARAMS"
+FROM_FILE = frozenset(
+    {
+        *("patrolling_node", "sensor_watch", "console", "home_assistant", "twist_mux", "map_server"),
+        *("esp_client1", "esp_client2", "esp_client3"),
+    }
+)
 T = TypeVar("T", bound="DataclassInstance")
 
 log = logging.getLogger(__name__)
@@ -113,8 +121,31 @@ class _Ending:
 def load_params(cls: type[T], *, ignore: Iterable[str] = (), tree: dict[str, Any] | None = None) -> T:
     """Load the node's private parameters through their declaration (one round trip to the master)."""
     if tree is None:
-        tree = rospy.get_param("~", {}) or {}
+        tree = private_params()
     return params.load(cls, tree, name=rospy.get_name() + "/", ignore=ignore)
+
+
+def private_params() -> dict[str, Any]:
+    """The node's private parameters: from the parameter server, or where it runs as a service, from the service's file.
+
+    Anybody who reaches the master can change parameters there, and a node that starts again would take them. The
+    service (`host/serve.py`) writes what the launch file sets into a file. Nodes with dynamic_reconfigure still read
+    the server, where their changes outlast a restart.
+
+    Raises:
+        ParamError: the file cannot be used.
+    """
+    path = os.environ.get(SERVICE_PARAMS, "")
+    name = rospy.get_name()
+    if path and name.rpartition("/")[2] in FROM_FILE:
+        try:
+            tree: Any = read_json(Path(path)) or {}
+        except StateError as err:
+            raise ParamError(name, str(err)) from err
+        for part in name.strip("/").split("/"):
+            tree = tree.get(part, {}) if isinstance(tree, dict) else {}
+        return dict(tree)
+    return dict(rospy.get_param("~", {}) or {})
 
 
 def ros_home() -> Path:

@@ -124,6 +124,7 @@ class GraphReader:
             )
         )
         self._uris: dict[str, str] = {}
+        self._seen: set[str] = set()
         self._refused = ""
         self.findings: list[Finding] = []
 
@@ -171,7 +172,8 @@ class GraphReader:
         found = {}
         for name, own in _STEADY.items():
             node = rospy.resolve_name(name)
-            if node in self._uris:
+            if node in self._uris or node in self._seen:  # while it starts again, too
+                self._seen.add(node)
                 found[node] = digests(self._tree(node), own)
         return found
 

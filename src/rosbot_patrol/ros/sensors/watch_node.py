@@ -28,6 +28,7 @@ from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StateError
 from rosbot_patrol.files import read_json, write_json
+from rosbot_patrol.host.watchdog import Systemd
 from rosbot_patrol.msg import Arming as ArmingMsg
 from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
@@ -37,7 +38,7 @@ from rosbot_patrol.ros.bridge.links import links_from_msg
 from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import Health
 from rosbot_patrol.ros.runtime.file_watch import FileWatch
-from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node, sender_of
+from rosbot_patrol.ros.runtime.node import Worker, load_params, private_params, run_node, sender_of
 from rosbot_patrol.ros.runtime.private_files import keep_private
 from rosbot_patrol.ros.runtime.process import start_anew
 from rosbot_patrol.ros.runtime.state_folder import state_folder
@@ -56,6 +57,7 @@ log = logging.getLogger(__name__)
 STEP = 0.25  # [s] of the wall
 REPORT_EVERY = 4  # steps
 STATES_EVERY = 20  # steps between messages if nothing changes
+_HELD_UP_BY = (Kind.PATROL_GONE, Kind.BRIDGE_GONE)
 MAX_WAITING = 20_000  # messages between two steps; far above the rate of a flood
 
 
@@ -110,7 +112,7 @@ class SensorWatch:
     """The node sensor_watch: inputs, one thread that steps the supervisor, outputs."""
 
     def __init__(self) -> None:
-        tree = rospy.get_param("~", {}) or {}
+        tree = private_params()
         refuse_passwords(tree)
         given, mail = load_group(SensorWatchParams, tree), load_group(MailParams, tree)
         folder = state_folder(given.state_dir, rospy.get_namespace())
@@ -131,6 +133,7 @@ class SensorWatch:
         self._looks = Looks(load_group(LookTimes, tree))
         self._reports = Reports(self._health)
         self._graph = GraphReader(load_group(GraphParams, tree))
+        self._systemd = Systemd()
         self._unwritten = False
         self._retry_at = 0.0
         named = f"{count_of(len(sensors), 'sensor')} of {sensors.source}"
@@ -211,10 +214,22 @@ class SensorWatch:
         self._reports.update_graph(self._watch, self._graph.findings)
         if events or not count % STATES_EVERY:
             self._states.publish(states_to_msg(statuses, self._watch))
+        self._feed_systemd()
         self._tell_owner(statuses)
         for look in self._looks.update(self._watch, statuses, time.monotonic()):
             log.warning("%s: the robot is asked to look at room %d", look.text, look.room)
             self._events.publish(look_to_msg(look, self._watch))
+
+    def _feed_systemd(self) -> None:
+        """Under systemd: all is at work, once the patrol was heard; what is not there holds its watchdog back."""
+        if not (self._systemd.is_there and self._watch.patrol):
+            return
+        gone = [self._watch.title(key) for key in self._watch.problems() if key.kind in _HELD_UP_BY]
+        if not self._post.is_at_work:
+            gone.append("the post")
+        self._systemd.say(f"not at work: {', '.join(gone)}" if gone else "on guard")
+        if not gone:
+            self._systemd.feed()
 
     def _take(self) -> None:
         while self._triggers:

@@ -24,6 +24,14 @@ def test_what_was_called_between_the_last_sign_and_the_start_was_missed(tmp_path
     assert [again.missed(t) for t in (1008.0, 1009.9, 1020.0, 1030.1, 1031.0)] == [False, True, True, True, False]
 
 
+def test_a_gap_longer_than_a_restart_is_known(tmp_path: Path) -> None:
+    Vigil(tmp_path / "alive", 1000.0)
+    assert Vigil(tmp_path / "alive", 1030.0).down is None
+    again = Vigil(tmp_path / "alive", 90_000.0)
+    assert again.down == 1030.0
+    assert not again.has_gap
+
+
 def test_after_an_orderly_end_nothing_was_missed(tmp_path: Path) -> None:
     first = Vigil(tmp_path / "alive", 1000.0)
     first.end()
