@@ -1,12 +1,15 @@
 """sensor_watch before a real master: real TCP, a real bridge, virtual ESP32s, mails in a Maildir."""
 
+import http.server
 import json
 import mailbox
 import re
 import signal
+import threading
 import time
 from email.header import decode_header, make_header
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 import yaml
@@ -320,3 +323,55 @@ def test_hosts_that_make_no_sense_are_refused(ros, tmp_path):
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], graph_hosts="pc 10.0.0.0/99")
     watch.node.says("/sensor_watch/graph_hosts: '10.0.0.0/99' is no name, address or network")
     assert watch.node.stop(None) == 1
+
+
+class Outside(http.server.BaseHTTPRequestHandler):
+    """A service that waits for heartbeats."""
+
+    calls: ClassVar[list[tuple[str, str]]] = []
+    answer = 200
+
+    def do_GET(self):
+        self.calls.append((self.command, self.path))
+        self.send_response(self.answer)
+        self.end_headers()
+
+    def do_POST(self):
+        self.do_GET()
+
+    def log_message(self, *_):
+        pass
+
+
+def test_a_heartbeat_is_sent_while_all_is_well_and_only_then(ros, tmp_path):
+    server = http.server.HTTPServer(("127.0.0.1", 0), Outside)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    url = f"http://127.0.0.1:{server.server_port}/api/webhook/secret"
+    probe = ros.probe()
+    for topic in (EVENTS, DIAGNOSTICS):
+        probe.tell(subscribe=topic)
+    probe.tell(advertise=["/patrol/alive", "std_msgs/Empty"])
+    watch = Watch(ros, tmp_path, [], heartbeat_url=url, heartbeat_period=1.0, patrol_after=3.0)
+    watch.node.says("watching")
+    probe.tell(linked="/patrol/alive")
+    assert Outside.calls == []  # the patrol was not heard yet
+    until = time.monotonic() + 4.0
+    while time.monotonic() < until:
+        probe.tell(publish=["/patrol/alive", {}])
+        time.sleep(0.5)
+    wait_for(lambda: len(Outside.calls) >= 2, what="two heartbeats")
+    assert set(Outside.calls) == {("POST", "/api/webhook/secret")}
+    probe.expect(lambda said: "it arrives at 127.0.0.1" in str(said.get("status")))
+    probe.expect(lambda said: said.get("kind") == "patrol_gone" and said.get("active"))
+    time.sleep(6.0)
+    count = len(Outside.calls)
+    time.sleep(2.5)
+    assert len(Outside.calls) == count
+    Outside.answer = 404
+    for _ in range(12):
+        probe.tell(publish=["/patrol/alive", {}])
+        time.sleep(0.5)
+    watch.node.says("the heartbeat does not arrive: 127.0.0.1 answers 404 Not Found")
+    assert "secret" not in watch.node.output
+    server.shutdown()
+    server.server_close()

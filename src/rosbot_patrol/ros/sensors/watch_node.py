@@ -43,6 +43,7 @@ from rosbot_patrol.ros.runtime.private_files import keep_private
 from rosbot_patrol.ros.runtime.process import start_anew
 from rosbot_patrol.ros.runtime.state_folder import state_folder
 from rosbot_patrol.ros.sensors.graph_reader import GraphParams, GraphReader
+from rosbot_patrol.ros.sensors.heartbeat import Heartbeat, HeartbeatParams
 from rosbot_patrol.ros.sensors.reports import Reports, event_to_msg, look_to_msg, states_to_msg
 from rosbot_patrol.sensors.looks import Looks
 from rosbot_patrol.sensors.notices import Notices, SensorReport
@@ -73,7 +74,7 @@ class SensorWatchParams:
     )
 
 
-GROUPS = (SensorWatchParams, WatchTimes, NoticeTimes, LookTimes, MailParams, GraphParams)
+GROUPS = (SensorWatchParams, WatchTimes, NoticeTimes, LookTimes, MailParams, GraphParams, HeartbeatParams)
 
 
 def load_group(cls: type, tree: Mapping[str, Any]) -> Any:
@@ -133,6 +134,7 @@ class SensorWatch:
         self._looks = Looks(load_group(LookTimes, tree))
         self._reports = Reports(self._health)
         self._graph = GraphReader(load_group(GraphParams, tree))
+        self._heartbeat = Heartbeat(load_group(HeartbeatParams, tree), self._health)
         self._systemd = Systemd()
         self._unwritten = False
         self._retry_at = 0.0
@@ -154,6 +156,7 @@ class SensorWatch:
         rospy.Subscriber("sensors/links", SensorLinks, self._on_links, queue_size=100)
         self._post.start()
         self._graph.start()
+        self._heartbeat.start()
         Worker(self._work, name="watch").start()
         rospy.spin()
 
@@ -214,22 +217,25 @@ class SensorWatch:
         self._reports.update_graph(self._watch, self._graph.findings)
         if events or not count % STATES_EVERY:
             self._states.publish(states_to_msg(statuses, self._watch))
-        self._feed_systemd()
+        self._report_life()
         self._tell_owner(statuses)
         for look in self._looks.update(self._watch, statuses, time.monotonic()):
             log.warning("%s: the robot is asked to look at room %d", look.text, look.room)
             self._events.publish(look_to_msg(look, self._watch))
 
-    def _feed_systemd(self) -> None:
-        """Under systemd: all is at work, once the patrol was heard; what is not there holds its watchdog back."""
-        if not (self._systemd.is_there and self._watch.patrol):
+    def _report_life(self) -> None:
+        """Tell systemd and the heartbeat's service, once the patrol was heard, that all is at work, or well."""
+        if not self._watch.patrol:
             return
-        gone = [self._watch.title(key) for key in self._watch.problems() if key.kind in _HELD_UP_BY]
+        problems = self._watch.problems()
+        gone = [self._watch.title(key) for key in problems if key.kind in _HELD_UP_BY]
         if not self._post.is_at_work:
             gone.append("the post")
         self._systemd.say(f"not at work: {', '.join(gone)}" if gone else "on guard")
         if not gone:
             self._systemd.feed()
+        if not gone and not any(key.kind in SERIOUS for key in problems):
+            self._heartbeat.all_is_well(time.monotonic())
 
     def _take(self) -> None:
         while self._triggers:

@@ -56,6 +56,7 @@ from rosbot_patrol.ros.gmapping.explore_node import ExploreParams
 from rosbot_patrol.ros.maps.server_node import MapServerParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
 from rosbot_patrol.ros.sensors.graph_reader import GraphParams
+from rosbot_patrol.ros.sensors.heartbeat import HeartbeatParams
 from rosbot_patrol.ros.sensors.watch_node import SensorWatchParams
 from rosbot_patrol.ros.simulator.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.simulator.node import SimulatorParams
@@ -131,6 +132,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
             ("", NoticeTimes),
             ("", LookTimes),
             ("", GraphParams),
+            ("", HeartbeatParams),
             ("", MailParams),
         ],
     ),
