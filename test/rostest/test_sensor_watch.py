@@ -323,6 +323,7 @@ def test_hosts_that_make_no_sense_are_refused(ros, tmp_path):
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], graph_hosts="pc 10.0.0.0/99")
     watch.node.says("/sensor_watch/graph_hosts: '10.0.0.0/99' is no name, address or network")
     assert watch.node.stop(None) == 1
+    ros.forget("/sensor_watch")
 
 
 class Outside(http.server.BaseHTTPRequestHandler):
@@ -375,3 +376,4 @@ def test_a_heartbeat_is_sent_while_all_is_well_and_only_then(ros, tmp_path):
     assert "secret" not in watch.node.output
     server.shutdown()
     server.server_close()
+    ros.forget("/sensor_watch")

@@ -20,6 +20,7 @@ class Kind(Enum):
     BRIDGE_GONE = "bridge_gone"
     DUPLICATE_ID = "duplicate_id"
     WRONG_PEER = "wrong_peer"
+    NEW_ADDRESS = "new_address"
     FLAPPING = "flapping"
     STUCK_ON = "stuck_on"
     NO_MOTION = "no_motion"

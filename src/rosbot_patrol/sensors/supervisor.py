@@ -45,6 +45,7 @@ _DELAYS: dict[Kind, tuple[float, float]] = {
     Kind.UNKNOWN_ID: (0.0, 0.0),
     Kind.DUPLICATE_ID: (5.0, 30.0),
     Kind.WRONG_PEER: (1.0, 60.0),
+    Kind.NEW_ADDRESS: (0.0, 0.0),  # has its own time
     Kind.CLOCK_OFF: (10.0, 30.0),
     Kind.BRIDGE_GONE: (0.0, 15.0),
 }
@@ -156,6 +157,15 @@ class Supervisor:
     def patrol_heard(self, node: str, now: float) -> None:
         """Record a sign of life of the patrol's node."""
         self._patrol = node, self._own(now)
+
+    def addresses(self) -> dict[str, str]:
+        """Address of each sensor of the file that speaks without a key, by id."""
+        return {str(number): t.address for number, t in self._tracked.items() if t.address and t.is_listed}
+
+    def recall_addresses(self, known: Mapping[str, str]) -> None:
+        """Set the addresses of before a restart."""
+        for number, tracked in self._tracked.items():
+            tracked.address = tracked.address or known.get(str(number), "")
 
     def graph_seen(self, findings: Iterable[Finding]) -> None:
         """Record what is wrong with the ROS graph now; open ports are no problem of a moment, and left out."""

@@ -13,6 +13,7 @@ FRESH = 3.0  # a peer heard within this time is active [s]
 REGULAR = 10  # messages without a gap after which an unlisted sensor is known to send heartbeats
 TALKER = 5  # messages without a gap after which a sender is more than a manual test
 MAX_SENDERS = 8
+NEW_FOR = 600.0  # time for which a new address is reported [s]
 BEATS = 4  # number of missed heartbeats that make a gap
 
 
@@ -40,6 +41,9 @@ class Tracked:
         spec: its entry in the file, None for an unknown id.
         began: when it was first expected or heard [s].
         is_listed: a file names it.
+
+    Attributes:
+        address: from which it speaks, if it has shown no key; "" before it was heard. A caller may set what it was.
     """
 
     def __init__(self, spec: SensorSpec | None, times: WatchTimes, began: float, *, is_listed: bool) -> None:
@@ -53,6 +57,8 @@ class Tracked:
         self.messages = 0
         self.triggers = 0
         self.bridge = ""
+        self.address = ""
+        self._moved: tuple[float, str] | None = None  # since when it has a new address, and the one before
         self._times = times
         self._run = 0
         self._is_regular = False
@@ -105,12 +111,20 @@ class Tracked:
             if known is None and self._peers and is_settled and not self._is_heard_elsewhere(key, now):
                 self._drop(now)  # a new connection in the place of the one before
             kept[key] = _Peer(link, known.since if known else now, heard)
+            if known is None and not link.proven and not self._is_heard_elsewhere(key, now):
+                self._note_address(link.host, now)
             if heard >= max((p.heard for p in self._peers.values()), default=heard):
                 self.bridge = bridge
         if kept or not self._peers:
             self._peers = kept
         else:  # remember the last connection, to recognise the next one as new
             self._peers = dict([max(self._peers.items(), key=lambda item: item[1].heard)])
+
+    def _note_address(self, host: str, now: float) -> None:
+        """Remember from where a sensor without a key speaks: anybody can take its id, but hardly its address."""
+        if self.address and host != self.address:
+            self._moved = now, self.address
+        self.address = host
 
     def _is_heard_elsewhere(self, key: tuple[str, str], now: float) -> bool:
         return any(other != key and now - peer.heard < 1.0 for other, peer in self._peers.items())
@@ -240,6 +254,12 @@ class Tracked:
             if not self.spec.may_speak_from(peer.link.host):
                 text = f"speaks from {peer.link.host}, which its file does not allow"
                 found[Kind.WRONG_PEER] = (peer.since, text)
+        if self._moved is not None and now - self._moved[0] > NEW_FOR:
+            self._moved = None
+        if self._moved is not None and not self.spec.peers:
+            text = f"speaks from {self.address}, and spoke from {self._moved[1]} before; it has no key"
+            found[Kind.NEW_ADDRESS] = (self._moved[0], text)
+        for peer in fresh:
             offset = peer.link.clock_offset
             if offset is not None and abs(offset) > self._times.clock_limit:
                 found[Kind.CLOCK_OFF] = (peer.since, f"has a clock that is {clock_words(offset)}")

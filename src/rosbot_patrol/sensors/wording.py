@@ -21,6 +21,7 @@ _ONE_IS: dict[Kind, str] = {
     Kind.BRIDGE_GONE: "has gone",
     Kind.DUPLICATE_ID: "is reported by two at a time",
     Kind.WRONG_PEER: "speaks from an address that is not its own",
+    Kind.NEW_ADDRESS: "speaks from another address than before",
     Kind.FLAPPING: "comes and goes",
     Kind.STUCK_ON: "reports motion without an end",
     Kind.NO_MOTION: "has seen no motion for very long",
@@ -48,6 +49,8 @@ _TO_DO: dict[Kind, str] = {
     " one another id. A key for each sensor shuts imitators out (docs/sensors.md, Security).",
     Kind.WRONG_PEER: "where it has a new address, correct 'peers' in the file of sensors. Otherwise somebody imitates"
     " it.",
+    Kind.NEW_ADDRESS: "a router gives new addresses at times; then nothing is to do. Otherwise another device imitates"
+    " the sensor. A key for each sensor ends both (docs/sensors.md, Keys).",
     Kind.FLAPPING: "a sensor's Wi-Fi is weak, or its power supply is: bring it nearer to the access point, and try"
     " another supply. A bridge that comes and goes is restarted again and again: its log says why.",
     Kind.STUCK_ON: "where nobody was there, something warm moves before it (heating, curtain, sun), its supply is"
@@ -158,6 +161,7 @@ def short(kinds: Sequence[Kind]) -> str:
         Kind.BRIDGE_GONE: "it was gone",
         Kind.DUPLICATE_ID: "two reported its id",
         Kind.WRONG_PEER: "it spoke from a wrong address",
+        Kind.NEW_ADDRESS: "it had a new address",
         Kind.FLAPPING: "it came and went",
         Kind.STUCK_ON: "it reported motion without an end",
         Kind.NO_MOTION: "it saw no motion",

@@ -3,6 +3,7 @@ import random
 import pytest
 from sensor_house import STEP, House, Speaker, brief
 
+from rosbot_patrol.sensors.problems import Link
 from rosbot_patrol.sensors.sensor_file import SensorSpec
 
 
@@ -314,3 +315,26 @@ def test_whatever_happens_each_problem_begins_and_ends_in_turn(seed):
     house.run(1000.0)
     gone = {"bridge_gone//esp_client2", "silent/9"}  # who left for good
     assert set(house.wrong()) - gone <= {f"no_motion/{i}" for i in (1, 2, 3)}
+
+
+def test_a_sensor_without_a_key_has_a_new_address():
+    house = House(3)
+    house.watch.recall_addresses({"3": "10.0.0.3"})
+    assert not [each for each in house.run(20) if each[0] == "new_address"]
+    house.speaker(3).peer = "10.0.0.66:5000"
+    told = [each for each in house.run(20) if each[0] == "new_address"]
+    assert told == [("new_address", 3, True)]
+    (problem,) = [p for k, p in house.watch.problems().items() if k.kind_name == "new_address"]
+    assert problem.what == "speaks from 10.0.0.66, and spoke from 10.0.0.3 before; it has no key"
+    assert house.watch.addresses() == {"3": "10.0.0.66"}
+    assert ("new_address", 3, False) in house.run(700)
+
+
+def test_an_address_that_changed_over_a_restart_is_noticed_and_one_with_a_key_may_change():
+    house = House(3)
+    house.watch.recall_addresses({"3": "10.0.0.99"})
+    assert ("new_address", 3, True) in house.run(10)
+    keyed = House(4)
+    keyed.watch.linked("/b", [Link(sensor_id=4, peer="10.0.0.4:1", proven=True)], keyed.now)
+    keyed.watch.linked("/b", [Link(sensor_id=4, peer="10.0.0.5:1", proven=True)], keyed.now + 1.0)
+    assert keyed.watch.addresses() == {}

@@ -131,6 +131,10 @@ class SensorWatch:
         self._notices = Notices(
             load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory), is_guarded=self._is_guarded
         )
+        memory = read_memory(self._memory) or {}
+        known = memory.get("addresses")
+        self._watch.recall_addresses(known if isinstance(known, dict) else {})
+        self._addresses = self._watch.addresses()
         self._looks = Looks(load_group(LookTimes, tree))
         self._reports = Reports(self._health)
         self._graph = GraphReader(load_group(GraphParams, tree))
@@ -254,13 +258,16 @@ class SensorWatch:
             log.warning("notice to the owner: %s", report.subject)
             self._post.put(to_notice(report))
             self._unwritten, self._retry_at = True, now
+        if self._watch.addresses() != self._addresses:
+            self._addresses = self._watch.addresses()
+            self._unwritten = True
         if self._unwritten and now >= self._retry_at and self._post.is_written:
             self._remember(now)
 
     def _remember(self, now: float) -> None:
         """Save what was reported, after the notices themselves are on disk."""
         try:
-            write_json(self._memory, self._notices.snapshot())
+            write_json(self._memory, {**self._notices.snapshot(), "addresses": self._addresses})
         except OSError as err:
             log.error("what was told cannot be kept in %s: %s; trying on", self._memory, err)
             self._retry_at = now + RETRY
