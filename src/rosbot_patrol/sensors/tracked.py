@@ -111,8 +111,6 @@ class Tracked:
             if known is None and self._peers and is_settled and not self._is_heard_elsewhere(key, now):
                 self._drop(now)  # a new connection in the place of the one before
             kept[key] = _Peer(link, known.since if known else now, heard)
-            if known is None and not link.proven and not self._is_heard_elsewhere(key, now):
-                self._note_address(link.host, now)
             if heard >= max((p.heard for p in self._peers.values()), default=heard):
                 self.bridge = bridge
         if kept or not self._peers:
@@ -254,6 +252,8 @@ class Tracked:
             if not self.spec.may_speak_from(peer.link.host):
                 text = f"speaks from {peer.link.host}, which its file does not allow"
                 found[Kind.WRONG_PEER] = (peer.since, text)
+        if len(fresh) == 1 and not fresh[0].link.proven:  # of two at a time nobody knows which is the sensor
+            self._note_address(fresh[0].link.host, now)
         if self._moved is not None and now - self._moved[0] > NEW_FOR:
             self._moved = None
         if self._moved is not None and not self.spec.peers:

@@ -336,5 +336,7 @@ def test_an_address_that_changed_over_a_restart_is_noticed_and_one_with_a_key_ma
     assert ("new_address", 3, True) in house.run(10)
     keyed = House(4)
     keyed.watch.linked("/b", [Link(sensor_id=4, peer="10.0.0.4:1", proven=True)], keyed.now)
+    keyed.watch.tick(keyed.now)
     keyed.watch.linked("/b", [Link(sensor_id=4, peer="10.0.0.5:1", proven=True)], keyed.now + 1.0)
+    keyed.watch.tick(keyed.now + 1.0)
     assert keyed.watch.addresses() == {}
