@@ -47,6 +47,7 @@ def install(programs: Sequence[tuple[str, str]]) -> list[str]:
     missing = [package for program, package in programs if not has(program)]
     if missing:
         try:
+            run("apt-get", "-o", "DPkg::Lock::Timeout=300", "update")
             run("env", "DEBIAN_FRONTEND=noninteractive", *_APT, *missing)
         except HostError as err:
             raise HostError(f"package {' '.join(missing)}", f"cannot be installed: {err.problem}") from err

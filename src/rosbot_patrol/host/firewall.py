@@ -29,7 +29,7 @@ class Firewall:
     Attributes:
         graph: port ranges of the ROS graph.
         bridges: ports on which motion sensors report.
-        interfaces: private network interfaces, whose machines may use the graph.
+        interfaces: private network interfaces; machines behind them may use the graph.
         sensors: networks from which sensors may report, such as 192.168.3.0/24 or fd00:3::/64.
         kept: ports inside the ranges that stay open, for other programs.
     """

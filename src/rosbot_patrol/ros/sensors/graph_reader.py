@@ -53,7 +53,7 @@ class GraphParams:
 
     graph_hosts: str = param(
         "10.203.87.0/24",
-        doc="machines beside this one whose nodes belong to the guard: names, addresses or networks, with spaces",
+        doc="further machines with nodes of the guard: names, addresses or networks, with spaces between",
     )
 
 
