@@ -39,8 +39,8 @@ ROUNDS = [
         "the command of the base is signed off": "the command of the base has gone",
     },
     {
-        "the bridge is told to end": "bridge /esp_client1 has gone",
-        "the patrol is told to end": "the patrol (patrolling_node) has gone",
+        "the bridge gets an order to end": "bridge /esp_client1 has gone",
+        "the patrol gets an order to end": "the patrol (patrolling_node) has gone",
         "a false node takes the patrol's name": "node /patrolling_node runs on 10.77.0.2",
     },
 ]

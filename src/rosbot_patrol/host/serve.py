@@ -3,7 +3,8 @@
 Parameters that the owner sets (channels, state folder, arming and the like) are written into a file before the master
 starts. The nodes read them there, so that nobody changes them on the parameter server.
 
-It watches the ROS master, on the PC that of the robot: nodes do not sign on again by themselves at a new one.
+It also watches the ROS master; on the PC this is the robot's master. If the master ends, all nodes must start again,
+because they do not sign on at a new one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Does the patrol hear the motion sensors? Its own count of their messages against that of the sensor watch.
+"""Does the patrol hear the motion sensors? It compares how many messages it and the sensor watch have received.
 
 Both listen to one topic. Somebody in the network can cut the patrol's link alone (any program may call a node's
 publisherUpdate), and the patrol would take the quiet for peace.

@@ -34,7 +34,7 @@ _PUBLISHED = {
     "motion_trigger": "the bridge of the motion sensors",
 }
 _CALLS, _ALIVE, _DRIVEN = "motion_trigger", "patrol/alive", "cmd_vel"
-# nodes whose parameters nobody changes while they run, and what they set themselves
+# nodes with parameters that stay as they are while the node runs; for each node, the parameters that it sets itself
 _STEADY: dict[str, frozenset[str]] = {
     "patrolling_node": frozenset(),
     "sensor_watch": frozenset(),
@@ -58,7 +58,7 @@ class GraphParams:
 
 
 class KnownHosts:
-    """Machines whose nodes belong to the guard.
+    """The guard's machines.
 
     Args:
         given: names, addresses and networks, with spaces between them.

@@ -100,7 +100,7 @@ class Prover:
 
     Args:
         sensor_id: 0 to 255; key: its 32 bytes.
-        version: of the proof; VERSION is that of older firmware, whose frames are not signed.
+        version: of the proof; with VERSION, as older firmware has it, frames are not signed.
 
     Attributes:
         session: key of the signed frames that follow the proof; None: they are not signed.

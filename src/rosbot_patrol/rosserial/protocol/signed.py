@@ -5,7 +5,7 @@
     session key = HMAC(sensor's key, SESSION + both nonces + id)
     direction's key = HMAC(session key, "from the sensor" or "from the bridge")
 
-HMAC is that of RFC 2104 with SHA-256. The counter begins at 0 for each direction and goes up by one with each frame, so
+HMAC is HMAC-SHA256 (RFC 2104). The counter begins at 0 for each direction and goes up by one with each frame, so
 a frame that is repeated, missing or out of order is noticed at the next one. A connection with such a frame ends: the
 sensor comes back with new nonces. The proof's own frames are not signed, because they are signatures themselves.
 
