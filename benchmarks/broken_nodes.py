@@ -24,6 +24,7 @@ import os
 import signal
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -96,44 +97,75 @@ def until(condition, seconds: float, each=lambda: None) -> bool:
 
 
 def break_node(house: House, diagnostics: Diagnostics, node: str, how: str, hung: float) -> Row:
-    """Run one mission with one fault."""
-    row = Row(node, how)
+    """Run one mission in which a node is killed, or hangs until roslaunch starts another."""
+    pids: list[int] = []
+
+    def hit() -> None:
+        pids.append(house.pids()[f"/{node}"])
+        os.kill(pids[0], signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+
+    def heal() -> None:
+        for pid in pids:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+
+    return mission_with(house, diagnostics, Row(node, how), Fault(hit, heal, hung, is_late=node in LOOKING))
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What breaks in a mission.
+
+    Attributes:
+        hit: breaks it; heal: mends it, or lets it be started again.
+        lasts: time between the two [s].
+        is_late: it comes as the robot begins to look, else in mid-drive.
+    """
+
+    hit: Callable[[], None]
+    heal: Callable[[], None]
+    lasts: float
+    is_late: bool = False
+
+
+def mission_with(house: House, diagnostics: Diagnostics, row: Row, fault: Fault) -> Row:
+    """Run one mission with somebody in the room and a fault; fills in the row."""
     before, mails, met = set(diagnostics.bad()), len(subjects(house)), len(house.contacts)
     house.spawn("burglar", *INTRUDER)
     house.trigger(ROOM)
-    phase = PatrolState.LOOKING if node in LOOKING else PatrolState.DRIVING
+    phase = PatrolState.LOOKING if fault.is_late else PatrolState.DRIVING
     house.wait(lambda: house.state.state == phase, 120.0, phase)
     if phase == PatrolState.DRIVING:
         start = house.pose
         house.wait(lambda: abs(house.pose.x - start.x) + abs(house.pose.y - start.y) > 1.0, 60.0, "the drive")
-    pid = house.pids()[f"/{node}"]
     began, wall = house.pose_stamp, time.monotonic()
-    os.kill(pid, signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+    fault.hit()
+    waiting = [fault.heal]
 
     def watch() -> None:
         for name, (_, message) in diagnostics.bad().items():
             if name not in before and name not in row.told:
                 row.told[name] = round(house.pose_stamp - began, 1), message
-        if how == "hung" and time.monotonic() - wall > hung:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
+        if waiting and time.monotonic() - wall > fault.lasts:
+            waiting.pop()()
         if row.over is None and house.state.state == PatrolState.IDLE:
             row.over = round(house.pose_stamp - began, 1)
 
     is_over = until(lambda: row.over is not None, 240.0, watch)
-    is_well = until(lambda: time.monotonic() - wall > hung + 3.0 and set(diagnostics.bad()) <= before, 90.0, watch)
+    is_well = until(lambda: not waiting and set(diagnostics.bad()) <= before, 90.0, watch)
     row.well = round(house.pose_stamp - began, 1) if is_over and is_well else None
     row.verdict, row.sentence = house.state.last_verdict, house.state.why
     row.mails = subjects(house)[mails:]
     row.touched = sorted({other for kind, other in house.contacts[met:] if kind != "floor"})
-    house.remove("burglar")
+    with contextlib.suppress(rospy.ServiceException):  # a new master does not know the service
+        house.remove("burglar")
     return row
 
 
 def table(rows: list[Row]) -> str:
     """Markdown table of the results."""
     lines = [
-        "| node | | verdict | told | mails | mission over [s] | well [s] | met |",
+        "| what | | verdict | told | mails | mission over [s] | well [s] | met |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
@@ -143,6 +175,15 @@ def table(rows: list[Row]) -> str:
         verdict, met = row.verdict or row.sentence, ", ".join(row.touched) or "-"
         lines.append(f"| {row.node} | {row.how} | {verdict} | {told} | {mails} | {times} | {met} |")
     return "\n".join(lines)
+
+
+def report(rows: list[Row], file: Path | None) -> None:
+    """Print the table, and write the figures as JSON where a file is given."""
+    in_workspace.require_figures(rows, "nothing was broken")
+    print(f"\n{table(rows)}")
+    if file:
+        figures = {f"{row.node} {row.how}": asdict(row) for row in rows}
+        file.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
 
 def main() -> None:
@@ -186,11 +227,7 @@ def main() -> None:
         house.stop()
     finally:
         master.stop()
-    in_workspace.require_figures(rows, "no node was broken")
-    print(f"\n{table(rows)}")
-    if options.json:
-        figures = {f"{row.node} {row.how}": asdict(row) for row in rows}
-        options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    report(rows, options.json)
 
 
 if __name__ == "__main__":

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import time
 from pathlib import Path
 
 from rosbot_patrol.files import sync_folder
+
+log = logging.getLogger(__name__)
 
 
 class DiskReserve:
@@ -23,7 +27,7 @@ class DiskReserve:
     def held(self) -> int:
         """Room that is held now [bytes]. Raises OSError."""
         try:
-            return self.path.stat().st_size
+            return self.path.stat().st_size if self.path.is_file() else 0
         except FileNotFoundError:
             return 0
 
@@ -40,6 +44,10 @@ class DiskReserve:
         system = os.statvfs(self.path.parent)
         if held >= self._size or system.f_bavail * system.f_frsize < only_with:
             return
+        if self.path.is_dir():  # after a repair of the disk
+            aside = self.path.with_name(f"{self.path.name}-{time.time_ns()}")
+            log.warning("%s is a folder where a file is expected: it is now called %s", self.path, aside.name)
+            self.path.rename(aside)
         handle = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o600)
         try:
             os.posix_fallocate(handle, 0, self._size)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rosbot_patrol.campaign.crash_plan import ALL
+from rosbot_patrol.campaign.crash_plan import ENDS_LIFE
 from rosbot_patrol.campaign.intervals import wilson
 from rosbot_patrol.campaign.plan import CLEAR
 from rosbot_patrol.counts import count_of
@@ -246,6 +246,6 @@ def open_call(journal: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     return calls[-1] if calls and calls[-1]["call"] not in done else None
 
 
-def everything_killed(journal: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether the last entry says that everything was killed."""
-    return bool(journal) and journal[-1]["kind"] == "kill" and journal[-1]["victim"] == ALL
+def is_killed(journal: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether the last entry is a kill after which the house starts anew."""
+    return bool(journal) and journal[-1]["kind"] == "kill" and journal[-1]["victim"] in ENDS_LIFE

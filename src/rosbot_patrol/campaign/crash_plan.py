@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 ALL = "all"
+MASTER = "master"
+ENDS_LIFE = (ALL, MASTER)  # the house starts anew after these
 GUARD = "patrolling_node"
 
 # Each block of kills has these once, in its own order: every node of the launch, the patrol itself more often.
 VICTIMS = (
-    GUARD, GUARD, GUARD, GUARD, ALL, ALL, "move_base", "amcl", "map_server", "twist_mux", "darknet_ros", "sensor_watch",
-    "esp_client1", "rgb_compress", "robot_state_publisher", "laser_broadcaster",
+    GUARD, GUARD, GUARD, GUARD, ALL, ALL, MASTER, MASTER, "move_base", "amcl", "map_server", "twist_mux", "darknet_ros",
+    "sensor_watch", "esp_client1", "rgb_compress", "robot_state_publisher", "laser_broadcaster",
 )  # fmt: skip
 
 # Moments of a patrol, in order, and the longest delay of a kill after them [s].
@@ -26,7 +28,7 @@ class Kill:
 
     Attributes:
         number: in the campaign.
-        victim: name of the node, or ALL.
+        victim: name of the node, ALL, or MASTER.
         moment: one of MOMENTS.
         delay: after it [s].
     """
@@ -39,7 +41,7 @@ class Kill:
 
 @dataclass(frozen=True, kw_only=True)
 class CrashPatrol:
-    """A patrol with its kills in order; where all are killed, that is the last."""
+    """A patrol with its kills in order; one after which the house starts anew is the last."""
 
     number: int
     kills: tuple[Kill, ...]
@@ -67,7 +69,7 @@ def plan_crashes(seed: int, kills: int) -> list[CrashPatrol]:
             delay = round(float(rng.uniform(0.0, MOMENTS[name])), 3)
             planned.append(Kill(number=number, victim=victim, moment=name, delay=delay))
             number += 1
-            if victim == ALL:
+            if victim in ENDS_LIFE:
                 break
         patrols.append(CrashPatrol(number=len(patrols), kills=tuple(planned)))
     return patrols

@@ -14,12 +14,14 @@ from rosbot_patrol.counts import count_of
 from rosbot_patrol.graph.snapshot import Snapshot, host_of, port_of
 
 SETTLED = 10.0  # time for which a link must have been there before its end means anything [s]
+MUTE = 10.0  # time without an answer of the master [s]
 GONE = 30.0  # time without it, longer than a node takes to start again [s]
 
 
 class Fault(Enum):
     """Kind of a finding."""
 
+    MASTER_GONE = "master_gone"
     SECOND_DRIVER = "second_driver"
     STRANGE_NODE = "strange_node"
     LINK_GONE = "link_gone"
@@ -71,6 +73,8 @@ class Judge:
     """Findings of each moment; remembers which links were there, and the parameters of each node's start."""
 
     expected: Expected
+    _run_id: str = ""
+    _answered: float | None = None
     _links: dict[tuple[str, str], _Link] = field(default_factory=dict)
     _first: dict[str, dict[str, str]] = field(default_factory=dict)
     _changed: list[Finding] = field(default_factory=list)
@@ -78,11 +82,22 @@ class Judge:
 
     def look(self, graph: Snapshot, now: float) -> list[Finding]:
         """All faults at a time [s] of a steady clock."""
+        self._answered = now
+        self._run_id = self._run_id or graph.run_id
+        if graph.run_id != self._run_id:  # nothing else can be judged: it knows no node of before
+            return [_master("was started anew and does not know the programs that run: what ends now stays away")]
         if graph.parameters is not None:
             self._changed = list(self._settings(graph.parameters))
         if graph.listening is not None:
             self._open = list(_open_ports(graph, graph.listening))
         return [*self._drivers(graph), *self._strangers(graph), *self._gone(graph, now), *self._changed, *self._open]
+
+    def no_answer(self, now: float, before: list[Finding]) -> list[Finding]:
+        """All faults where the master has not answered at a time [s]; `before`: those of the last look."""
+        self._answered = now if self._answered is None else self._answered
+        if now - self._answered < MUTE:
+            return before
+        return [_master("does not answer: a program that ends now will not find the others again")]
 
     def _drivers(self, graph: Snapshot) -> Iterable[Finding]:
         drivers = sorted(graph.publishers.get(self.expected.driven, ()))
@@ -124,6 +139,10 @@ class Judge:
                 more = f" and {len(changed) - 5} more" if len(changed) > 5 else ""
                 what = f"would start with other settings than before: {', '.join(changed[:5])}{more} changed"
                 yield Finding(fault=Fault.SETTINGS_CHANGED, subject=f"node {node}", what=what)
+
+
+def _master(what: str) -> Finding:
+    return Finding(fault=Fault.MASTER_GONE, subject="the ROS master", what=what)
 
 
 def _open_ports(graph: Snapshot, listening: frozenset[int]) -> Iterable[Finding]:

@@ -19,7 +19,7 @@ class Snapshot:
         uris: address of each node, as http://HOST:PORT/.
         parameters: digest of each watched node's parameters, by node; None: not asked this time.
         listening: TCP ports of this machine that others can reach; None: not asked this time.
-        master_port: TCP port of the master.
+        master_port: TCP port of the master; run_id: its mark since its start.
     """
 
     publishers: Mapping[str, frozenset[str]] = field(default_factory=dict)
@@ -28,6 +28,7 @@ class Snapshot:
     parameters: Mapping[str, Mapping[str, str]] | None = None
     listening: frozenset[int] | None = None
     master_port: int = 11311
+    run_id: str = ""
 
 
 def host_of(uri: str) -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import selectors
 import signal
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
+MASTER = "the master"
 _MARK = b"\0__name:="  # roslaunch gives each node its name
 
 
@@ -27,21 +30,20 @@ def find(master_uri: str, proc: Path = Path("/proc")) -> dict[int, str]:
         name = words.partition(_MARK)[2].partition(b"\0")[0].decode(errors="replace")
         is_master = b"rosmaster\0--core" in words
         if (name or is_master) and b"ROS_MASTER_URI=" + master_uri.encode() in environ.split(b"\0"):
-            found[int(process.name)] = name or "the master"
+            found[int(process.name)] = name or MASTER
     return found
 
 
-def end(processes: dict[int, str], patience: float = 5.0) -> None:
-    """End processes: with SIGTERM, and those that are still there after `patience` [s] with SIGKILL."""
+def end(processes: Iterable[int], patience: float = 5.0) -> None:
+    """Kill processes, and wait until they have ended, `patience` [s] at most.
+
+    SIGKILL, because they belong to a run that was ended by force; the next start takes up the mission and the calls.
+    """
     handles = [handle for process in processes if (handle := _open(process)) is not None]
-    for number, seconds in ((signal.SIGTERM, patience), (signal.SIGKILL, 1.0)):
-        for handle in handles:
-            try:
-                signal.pidfd_send_signal(handle, number)
-            except ProcessLookupError:
-                continue  # it has ended
-        handles = _wait(handles, seconds)
     for handle in handles:
+        with contextlib.suppress(ProcessLookupError):  # it has ended
+            signal.pidfd_send_signal(handle, signal.SIGKILL)
+    for handle in _wait(handles, patience):
         os.close(handle)
 
 

@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 KEPT_LOGS = 8_000_000  # of earlier runs [bytes]
 LOOK = 1.0  # [s]
 GONE, AWAY = 3.0, 8.0  # time without an answer after which the master counts as gone: here, or over a network [s]
-HURRY = 2.0  # time for nodes to end [s]
+_KEEP = "keep_calls_at_end:=true"  # the last one counts, so that the owner can still say otherwise
 PARAMS = "ROSBOT_PATROL_PARAMS"  # names the file of parameters that nodes read instead of the server
 
 
@@ -81,7 +81,7 @@ def _serve() -> int:
     if removed:
         log.info("logs of %d earlier runs were removed", len(removed))
     _compile()
-    launch = ["rosbot_patrol", ROLES[role], *arguments]
+    launch = ["rosbot_patrol", ROLES[role], *([] if role == "pc" else [_KEEP]), *arguments]
     _keep_params(launch)
     options = ["--screen", "--skip-log-check", *(["--wait"] if role == "pc" else [])]
     child = subprocess.Popen(["roslaunch", *options, *launch], stdin=subprocess.DEVNULL)
@@ -90,7 +90,7 @@ def _serve() -> int:
     try:
         _stay_with(child, master, feeds=role == "pc", patience=AWAY if role == "pc" else GONE)
     finally:  # at once: systemd would wait for nodes that cannot sign off at a dead master
-        orphans.end(orphans.find(master), HURRY)
+        orphans.end(orphans.find(master))
     return child.wait()
 
 

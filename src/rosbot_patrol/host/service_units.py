@@ -91,6 +91,7 @@ Restart=always
 RestartSec=1
 TimeoutStartSec=300
 TimeoutStopSec=20
+KillMode=mixed
 WatchdogSec=20
 WatchdogSignal=SIGKILL
 StateDirectory={NAME}

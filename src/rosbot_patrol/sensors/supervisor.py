@@ -34,6 +34,7 @@ MAX_BRIDGES = 64
 # Times [s] for which a condition must hold to begin, and must not hold to be over.
 _DELAYS: dict[Kind, tuple[float, float]] = {
     Kind.PATROL_GONE: (0.0, 3.0),
+    Kind.MASTER_GONE: (0.0, 5.0),  # has its own time
     Kind.SECOND_DRIVER: (3.0, 10.0),
     Kind.STRANGE_NODE: (0.0, 10.0),
     Kind.LINK_GONE: (0.0, 5.0),  # has its own time

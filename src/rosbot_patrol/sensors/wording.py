@@ -13,6 +13,7 @@ MAX_LISTED = 20  # of one kind in one notice
 
 _ONE_IS: dict[Kind, str] = {
     Kind.PATROL_GONE: "has gone, or hangs",
+    Kind.MASTER_GONE: "has gone, or was started anew",
     Kind.SECOND_DRIVER: "has a second publisher",
     Kind.STRANGE_NODE: "runs on a machine that the guard does not know",
     Kind.LINK_GONE: "has gone",
@@ -31,6 +32,8 @@ _ONE_IS: dict[Kind, str] = {
 _TO_DO: dict[Kind, str] = {
     Kind.PATROL_GONE: "where it has ended, it is started again by itself within seconds, and takes up what it was at."
     " Where it has not come back by now, look at the robot, at its log and at its disk, and start it anew.",
+    Kind.MASTER_GONE: "start the guard anew: its programs go on for now, but none that ends comes back. As a service"
+    " (scripts/install-service) it does so by itself.",
     Kind.SECOND_DRIVER: "where you drive with a program of your own, end it. Otherwise somebody in your network drives"
     " the robot: press the emergency stop, take the robot off the network, and close the graph with scripts/secure"
     " (docs/security.md).",
@@ -153,6 +156,7 @@ def short(kinds: Sequence[Kind]) -> str:
     """Problems in a few words: "it was silent, it came and went"."""
     was = {
         Kind.PATROL_GONE: "it was gone",
+        Kind.MASTER_GONE: "it was gone",
         Kind.SECOND_DRIVER: "it had a second publisher",
         Kind.STRANGE_NODE: "it was there",
         Kind.LINK_GONE: "it was gone",

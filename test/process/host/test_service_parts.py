@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -38,11 +37,8 @@ def test_orphans_are_ended_and_others_are_not() -> None:
     meek, deaf, other = orphan("amcl"), orphan("patrolling_node", stubborn), orphan("x", master=MASTER + "8")
     found = orphans.find(MASTER)
     assert found == {meek.pid: "amcl", deaf.pid: "patrolling_node"}
-    began = time.monotonic()
     orphans.end(found)
-    assert meek.wait(1.0) == -signal.SIGTERM
-    assert deaf.wait(1.0) == -signal.SIGKILL
-    assert 4.5 < time.monotonic() - began < 15.0
+    assert meek.wait(1.0) == deaf.wait(1.0) == -signal.SIGKILL
     assert other.poll() is None
     other.kill()
     other.wait()

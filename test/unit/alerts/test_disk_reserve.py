@@ -42,3 +42,14 @@ def test_a_disk_that_fills_meanwhile_keeps_what_was_held(reserve, monkeypatch, h
         reserve.fill()
     assert reserve.held == held
     assert reserve.path.exists() is bool(held)
+
+
+def test_a_folder_in_its_place_is_moved_aside(tmp_path):
+    (tmp_path / "reserve").mkdir()
+    (tmp_path / "reserve" / "x").touch()
+    reserve = DiskReserve(tmp_path / "reserve", 4096)
+    assert reserve.held == reserve.give(100) == 0
+    reserve.fill()
+    assert reserve.held == 4096
+    (aside,) = tmp_path.glob("reserve-*")
+    assert (aside / "x").exists()

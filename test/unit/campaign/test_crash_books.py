@@ -13,11 +13,11 @@ from rosbot_patrol.campaign.crash_ledger import (
     KeptMail,
     KeptRecord,
     balance,
-    everything_killed,
+    is_killed,
     next_patrol,
     open_call,
 )
-from rosbot_patrol.campaign.crash_plan import ALL, MOMENTS, VICTIMS, plan_crashes
+from rosbot_patrol.campaign.crash_plan import ALL, ENDS_LIFE, MASTER, MOMENTS, VICTIMS, plan_crashes
 
 
 def call(name: str, wall: float, patrol: int = 0, room: int = 1) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def test_kills_of_a_patrol_come_in_the_order_of_its_moments_and_all_comes_last()
     for patrol in plan_crashes(3, 100):
         places = [order.index(kill.moment) for kill in patrol.kills]
         assert places == sorted(places)
-        assert ALL not in [kill.victim for kill in patrol.kills[:-1]]
+        assert not {kill.victim for kill in patrol.kills[:-1]} & set(ENDS_LIFE)
 
 
 def test_a_clean_campaign() -> None:
@@ -126,6 +126,7 @@ def test_the_journal_goes_on_where_a_kill_cut_it(tmp_path: Path) -> None:
     open_one = open_call(lines)
     assert open_one is not None
     assert open_one["call"] == "p4"
-    assert not everything_killed(lines)
+    assert not is_killed(lines)
     assert open_call([*lines, {"kind": "verdict", "call": "p4"}]) is None
-    assert everything_killed([*lines, kill("p4", ALL)])
+    assert is_killed([*lines, kill("p4", ALL)])
+    assert is_killed([*lines, kill("p4", MASTER)])

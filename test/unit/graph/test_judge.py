@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rosbot_patrol.graph.judge import GONE, SETTLED, Expected, Fault, Finding, Judge
+from rosbot_patrol.graph.judge import GONE, MUTE, SETTLED, Expected, Fault, Finding, Judge
 from rosbot_patrol.graph.snapshot import Snapshot, digests
 
 MINE = "http://localhost:40001/"
@@ -81,3 +81,19 @@ def test_open_ports_of_master_and_nodes(judge: Judge) -> None:
     assert found.fault is Fault.GRAPH_OPEN
     assert "the ROS master (11311) and 1 node: /twist_mux (40001)" in found.what
     assert judge.look(graph(listening=frozenset({22})), 1.0) == []
+
+
+def test_a_master_that_does_not_answer(judge: Judge) -> None:
+    assert judge.no_answer(0.0, []) == []
+    before = judge.look(graph(publishers={}, run_id="a"), 1.0)
+    assert judge.no_answer(5.0, before) == before
+    (found,) = judge.no_answer(1.0 + MUTE, before)
+    assert (found.fault, found.subject) == (Fault.MASTER_GONE, "the ROS master")
+    assert judge.look(graph(run_id="a"), 20.0) == []
+
+
+def test_a_master_that_was_started_anew_is_told_alone(judge: Judge) -> None:
+    judge.look(graph(run_id="a", parameters={"/patrol": digests({"x": 1})}), 0.0)
+    (found,) = judge.look(graph(run_id="b", publishers={}, subscribers={}, parameters={"/patrol": {}}), 100.0)
+    assert found.fault is Fault.MASTER_GONE
+    assert "started anew" in found.what

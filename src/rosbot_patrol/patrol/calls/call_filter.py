@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from rosbot_patrol.patrol.calls.own_motion import OwnMotion
 from rosbot_patrol.patrol.calls.queue import MissionQueue, PriorityParams
 from rosbot_patrol.patrol.calls.repeats import Repeats
+from rosbot_patrol.patrol.calls.unrest import Unrest
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.patrol.records.commands import Ignored
 from rosbot_patrol.patrol.records.inputs import Inputs
@@ -39,11 +40,12 @@ class CallFilter:
         own_motion: where the robot was.
 
     Attributes:
-        count: missions so far.
+        count: missions so far; unrest: how often sensors called.
     """
 
     def __init__(self, rooms: Rooms, queue: MissionQueue, priorities: PriorityParams, own_motion: OwnMotion) -> None:
         self.count = 0
+        self.unrest = Unrest()
         self._rooms, self._queue, self._priorities, self._own_motion = rooms, queue, priorities, own_motion
         self._repeats, self._set_aside, self._off_map = Repeats(), Repeats(), Repeats(_OFF_MAP)
 
@@ -66,6 +68,7 @@ class CallFilter:
                 self._join(answering, room, now, taken)
             else:
                 self._weigh(room, now, inputs, mission, taken, has_candidate=has_candidate)
+            self.unrest.call(room_id, now)
         for request in inputs.requests:
             if inputs.guarded.is_quiet and request.origin is Origin.SCHEDULE:
                 log.info("the round is left out: quiet hours; room %d", request.room_id)
@@ -132,16 +135,16 @@ class CallFilter:
                 mission.own_motion.append((inputs.wall, room.id))
                 taken.changed = True
         else:
-            self._follow(room, inputs, mission, taken)
+            self._follow(room, now, inputs, mission, taken)
             return
         if self._set_aside.is_news(room.id, now):
             log.info("motion in %s starts no mission: %s", room.title, why)
             of = mission.id if mission else ""
             taken.ignored += (Ignored(wall=inputs.wall, room_id=room.id, why=why, mission=of),)
 
-    def _follow(self, room: Room, inputs: Inputs, mission: Mission | None, taken: Taken) -> None:
+    def _follow(self, room: Room, now: float, inputs: Inputs, mission: Mission | None, taken: Taken) -> None:
         is_new = self._queue.find(room.id) is None
-        self._add(Request(room_id=room.id, wall=inputs.wall), mission)
+        self._add(Request(room_id=room.id, wall=inputs.wall, earlier=self.unrest.calls(room.id, now)), mission)
         taken.changed |= is_new
 
 

@@ -1,6 +1,6 @@
-"""Mission queue: one entry per waiting room, the most urgent first, in order of arrival among equals.
+"""Mission queue: one entry per waiting room, the most urgent first.
 
-The rooms that wait for a mission: one entry a room, the most urgent first, in order of arrival among equals.
+Among rooms of one priority, movement counts first, then fewer calls before, then the longer wait.
 """
 
 from __future__ import annotations
@@ -39,9 +39,14 @@ class PriorityParams:
 
 
 class MissionQueue:
-    """Waiting requests."""
+    """Waiting requests.
+
+    Attributes:
+        stirring: rooms in which something moves.
+    """
 
     def __init__(self) -> None:
+        self.stirring: frozenset[int] = frozenset()
         self._waiting: dict[int, Request] = {}
 
     def add(self, request: Request) -> bool:
@@ -59,14 +64,14 @@ class MissionQueue:
     def put_back(self, request: Request) -> None:
         """Queue a request in front of all others of its priority."""
         others = {room: kept for room, kept in self._waiting.items() if room != request.room_id}
-        self._waiting = {request.room_id: request, **others}
+        self._waiting = {request.room_id: dataclasses.replace(request, earlier=-1), **others}
 
     def find(self, room_id: int) -> Request | None:
         """Waiting request of a room."""
         return self._waiting.get(room_id)
 
     def pop(self) -> Request:
-        """Remove and return the most urgent request, the oldest among equals."""
+        """Remove and return the most urgent request."""
         first = next(iter(self))
         return self._waiting.pop(first.room_id)
 
@@ -87,7 +92,10 @@ class MissionQueue:
         return tuple(request.room_id for request in self)
 
     def __iter__(self) -> Iterator[Request]:
-        return iter(sorted(self._waiting.values(), key=lambda request: -request.priority))
+        return iter(sorted(self._waiting.values(), key=self._rank))
+
+    def _rank(self, request: Request) -> tuple[int, bool, int]:
+        return -request.priority, request.room_id not in self.stirring, request.earlier
 
     def __len__(self) -> int:
         return len(self._waiting)

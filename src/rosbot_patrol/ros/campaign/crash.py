@@ -1,4 +1,4 @@
-"""One life of a house in a crash campaign: patrols with an intruder and killed programs, until all are killed."""
+"""One life of a house in a crash campaign: patrols with an intruder and killed programs, until all end."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ import rospy
 
 from rosbot_patrol.campaign.cast import plain_place
 from rosbot_patrol.campaign.crash_ledger import Journal, next_patrol, open_call
-from rosbot_patrol.campaign.crash_plan import ALL, Kill, plan_crashes
+from rosbot_patrol.campaign.crash_plan import ALL, ENDS_LIFE, MASTER, Kill, plan_crashes
 from rosbot_patrol.campaign.floor import Floor
-from rosbot_patrol.campaign.houses import load_house
+from rosbot_patrol.campaign.houses.files import house_files, load_house
 from rosbot_patrol.campaign.plan import CONFIRMED
+from rosbot_patrol.host import orphans
+from rosbot_patrol.host.serve import GONE
 from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.ros.campaign.house import House, HouseError, Master, child_pids
 from rosbot_patrol.ros.campaign.mail_sink import MailSink
@@ -31,7 +33,7 @@ JOURNAL = "journal.jsonl"
 
 
 class CrashLife:
-    """A house from its start until everything is killed, or its patrols are over.
+    """A house from its start until everything or the master is killed, or its patrols are over.
 
     Args:
         folder: folder of the journal, the guard's state and the mails, including those of earlier lives.
@@ -47,7 +49,7 @@ class CrashLife:
         self._open = open_call(lines)
         self._patrols = plan_crashes(seed, kills)[next_patrol(lines) :][:PATROLS]
         life = sum(line["kind"] == "life" for line in lines)
-        house = load_house(HOUSE, root)
+        house = load_house(house_files(HOUSE, root))
         rooms = [room.id for room in house.rooms if room.id != house.rooms.base.id]
         self._room = rooms[life % len(rooms)]
         self._place = plain_place(Floor(house.bodies, house.rooms), self._room, np.random.default_rng([seed, life, 13]))
@@ -134,12 +136,14 @@ class CrashLife:
         facts = {"call": call["call"], "number": kill.number, "victim": kill.victim, "moment": kill.moment}
         facts |= {"delay": kill.delay, "state": state.state if state else "", "wall": time.time()}
         pids = self._pids()
-        if kill.victim != ALL and kill.victim not in pids:
+        if kill.victim not in (*ENDS_LIFE, *pids):
             self._journal.add("missing", **facts)
             return
         self._journal.add("kill", **facts)
         if kill.victim == ALL:
             self._kill_all()
+        if kill.victim == MASTER:
+            self._kill_master()
         with suppress(ProcessLookupError):
             os.kill(pids[kill.victim], signal.SIGKILL)
 
@@ -168,6 +172,16 @@ class CrashLife:
         """Kill launch, nodes, master and this program at once, as in a power cut."""
         self._house.kill()
         self._master.kill()
+        os._exit(0)
+
+    def _kill_master(self) -> None:
+        """Kill the ROS master; then end launch and nodes as late and in the same way as the service does."""
+        master = os.environ["ROS_MASTER_URI"]
+        os.kill(next(pid for pid, name in orphans.find(master).items() if name == orphans.MASTER), signal.SIGKILL)
+        time.sleep(GONE)
+        with suppress(ProcessLookupError):
+            os.kill(self._house.pid, signal.SIGKILL)
+        orphans.end(orphans.find(master))
         os._exit(0)
 
 

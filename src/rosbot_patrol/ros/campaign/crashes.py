@@ -12,7 +12,7 @@ from pathlib import Path
 from rosbot_patrol.alerts.records.incident import Incident
 from rosbot_patrol.alerts.records.store import IncidentStore, has_incidents
 from rosbot_patrol.alerts.records.verify import verify
-from rosbot_patrol.campaign.crash_ledger import Books, Journal, KeptRecord, balance, everything_killed, next_patrol
+from rosbot_patrol.campaign.crash_ledger import Books, Journal, KeptRecord, balance, is_killed, next_patrol
 from rosbot_patrol.campaign.crash_plan import plan_crashes
 from rosbot_patrol.campaign.plan import CONFIRMED
 from rosbot_patrol.campaign.progress import progress_line
@@ -73,10 +73,10 @@ class CrashCampaign:
         )
 
     def _lives(self, space: bool) -> Iterator[Job]:
-        """Run lives until every patrol has been requested, and one more if everything was killed at the end."""
+        """Run lives until every patrol has been requested, and one more if the last one was killed."""
         while True:
             lines = self._journal.read()
-            if next_patrol(lines) >= self._patrols and not everything_killed(lines):
+            if next_patrol(lines) >= self._patrols and not is_killed(lines):
                 return
             if self._fruitless >= _FRUITLESS:
                 log.error("%d lives came to nothing, see %s", _FRUITLESS, self.folder / "roslaunch.log")

@@ -139,6 +139,7 @@ class GraphReader:
                 self.findings = self._judge.look(self._read(is_whole=not count % SELDOM), time.monotonic())
             except (OSError, rosgraph.MasterException) as err:  # it has gone, and the node with it, or it is busy
                 log.debug("the graph cannot be read: %s", err)
+                self.findings = self._judge.no_answer(time.monotonic(), self.findings)
             count += 1
             time.sleep(PERIOD)
 
@@ -160,7 +161,14 @@ class GraphReader:
             parameters=self._parameters() if is_whole else None,
             listening=self._open_ports() if is_whole else None,
             master_port=self._master_port,
+            run_id=self._run_id(),
         )
+
+    def _run_id(self) -> str:
+        try:
+            return str(self._master.getParam("/run_id"))
+        except rosgraph.MasterError:
+            return ""  # a master without roslaunch has none
 
     def _lookup(self, node: str) -> str:
         try:
