@@ -15,6 +15,8 @@ import roslaunch.config
 import roslaunch.xmlloader
 import roslib.packages
 
+from rosbot_patrol.patrol.mission.params import NodeParams
+
 ROOT = Path(__file__).parents[2]
 OURS = sorted((ROOT / "launch").glob("*.launch"))
 FORWARDED = sorted((ROOT / "drop_in").glob("*/launch/*.launch"))
@@ -169,10 +171,12 @@ def test_networks_by_name() -> None:
     assert network_of("rosbot_patrol.launch", f"network_param_file:={yaml}", robot=True) == tiny
 
 
-def test_on_a_robot_only_people_alarm() -> None:
-    key = "/patrolling_node/alarm_classes"
-    assert parse(ROOT / "launch" / "rosbot_patrol.launch", robot=True).params[key].value == ["person"]
-    assert key not in parse(ROOT / "launch" / "rosbot_patrol.launch").params
+def test_a_hydrant_alarms_in_the_tutorial_s_profile_only() -> None:
+    path, key = ROOT / "launch" / "rosbot_patrol.launch", "/patrolling_node/alarm_classes"
+    assert parse(path, "profile:=tutorial").params[key].value == ["person", "fire hydrant"]
+    for is_robot in (False, True):
+        assert key not in parse(path, robot=is_robot).params
+    assert NodeParams(path_to_params="").alarm_classes == ["person"]
 
 
 def test_the_standby_on_a_robot_takes_what_is_ready() -> None:

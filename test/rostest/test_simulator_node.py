@@ -41,7 +41,15 @@ from rosbot_patrol.srv import SpawnRobot
 rospy.wait_for_service("/simulator/spawn_robot")
 spawn = rospy.ServiceProxy("/simulator/spawn_robot", SpawnRobot)
 urdf = open("{ROOT}/urdf/rosbot.urdf").read()
-answers = [spawn("rosbot", urdf, pose) for pose in (Pose2D(-0.9, -1.2, 0), Pose2D(0, 0, 0))]
+answers = [spawn("rosbot", urdf, "", pose, 0.0) for pose in (Pose2D(-0.9, -1.2, 0), Pose2D(0, 0, 0))]
+box = "<geometry><box size='0.5 0.5 0.5'/></geometry>"
+stool = f"<robot name='s'><link name='l'><visual>{{box}}</visual><collision>{{box}}</collision></link></robot>"
+crate = box.replace("box size='0.5 0.5 0.5'/", "box><size>1 1 1</size></box")
+crate = f"<link name='l'><collision name='c'>{{crate}}</collision></link>"
+crate = f"<sdf version='1.6'><model name='m'>{{crate}}</model></sdf>"
+bare = "<robot name='b'><link name='l'/></robot>"
+for name, text in (("stool", stool), ("stool", stool), ("crate", crate), ("bare", bare)):
+    answers.append(spawn(name, text, "", Pose2D(1.5, 0.5, 0), 0.25))
 print(*(a.success for a in answers), *(a.message for a in answers), sep="|")
 """
 
@@ -120,8 +128,9 @@ def test_paused_time_stands_still_and_the_robot_comes_by_service(ros):
     time.sleep(0.4)
     assert len(probe.heard(topic="/clock")) <= count + 2
     done = subprocess.run([sys.executable, "-c", SPAWN], env=ros.env, capture_output=True, text=True)
-    assert done.stdout.split("|")[:2] == ["False", "True"], done.stderr
-    assert "is no place for it" in done.stdout
+    assert done.stdout.split("|")[:6] == ["False", "True", "True", "False", "True", "False"], done.stderr
+    for sentence in ("is no place for it", "the name is taken", "has neither wheels to drive by nor any shape"):
+        assert sentence in done.stdout
     probe.tell(subscribe=["/scan", "sensor_msgs/LaserScan"], call=["/simulator/unpause", "std_srvs/Empty", []])
     probe.expect(lambda s: s.get("topic") == "/scan")
 
@@ -142,6 +151,15 @@ def test_bad_input_is_one_sentence_and_the_end(ros, arguments, sentence):
     node.says(sentence, 20.0)
     assert node.popen.wait(PATIENCE) == 1
     assert "Traceback" not in node.output
+
+
+def test_a_world_with_something_at_its_origin_moves_the_start(ros, tmp_path):
+    box = "<geometry><box><size>1 1 1</size></box></geometry>"
+    world = f"""<sdf version="1.6"><world name="w"><model name="table"><static>true</static><pose>0 0 0.5 0 0 0</pose>
+    <link name="top"><collision name="c">{box}</collision></link></model></world></sdf>"""
+    (tmp_path / "a.world").write_text(world)
+    node = ros.node("simulator", URDF, f"_world:={tmp_path / 'a.world'}")
+    node.says("because the origin is no place for it; x:= and y:= place it elsewhere", 20.0)
 
 
 def test_it_ends_soon_on_an_interrupt(ros):

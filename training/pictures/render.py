@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.simulation.actors.looks import Look
 from rosbot_patrol.simulation.actors.people import person_body, person_pose_parts
-from rosbot_patrol.simulation.render.egl import EglRenderer, Light
+from rosbot_patrol.simulation.render.egl import EglRenderer
+from rosbot_patrol.simulation.render.lights import Light
 from rosbot_patrol.simulation.scene.scene import Intrinsics, Matrix
 from rosbot_patrol.simulation.scene.textures import SIDE, Texture
 from rosbot_patrol.simulation.sdf.world import World, load_world

@@ -22,7 +22,7 @@ from rosbot_patrol.simulation.actors.people import (
     person_pose_parts,
 )
 from rosbot_patrol.simulation.actors.pets import PETS, draw_pet, pet_body, pet_pose_parts
-from rosbot_patrol.simulation.render.egl import Light
+from rosbot_patrol.simulation.render.lights import Light
 from rosbot_patrol.simulation.scene.scene import Body, Material, Matrix, Shape, Visual
 from rosbot_patrol.simulation.scene.shapes import mesh_of
 from rosbot_patrol.simulation.sdf.world import World

@@ -8,7 +8,8 @@ from rosbot_patrol.detection.darknet.letterbox import Letterbox
 from rosbot_patrol.simulation.actors.looks import Look
 from rosbot_patrol.simulation.actors.people import person_body, person_pose_parts
 from rosbot_patrol.simulation.actors.pets import draw_pet, pet_body, pet_pose_parts
-from rosbot_patrol.simulation.render.egl import EglRenderer, Light
+from rosbot_patrol.simulation.render.egl import EglRenderer
+from rosbot_patrol.simulation.render.lights import Light
 from training.learning.mixing import FURNITURE
 from training.pictures import overlay, patterns, render, scenes, visibility
 from training.pictures.furniture import box, build, placed

@@ -37,6 +37,7 @@ from rosbot_patrol.simulation.sensors.lidar import LidarParams, measure_scan
 from rosbot_patrol.simulation.sensors.motion_sensors import MotionSensorParams, SensorPlace
 from rosbot_patrol.simulation.sensors.range_sensors import RangeParams, measure_range
 from rosbot_patrol.simulation.sensors.sensor_net import SensorNet
+from rosbot_patrol.simulation.start_place import places_around
 
 STEP = 0.005  # [s]
 HOME = Pose2D()
@@ -44,6 +45,7 @@ HOME = Pose2D()
 _ODOMETRY_EVERY = 10  # steps
 _MOTION_EVERY = 20
 _BATTERY_EVERY = 20
+_ROOM = 0.3  # free space around a start that was looked for [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,6 +180,44 @@ class Engine:
         robot = Equipment(self.params, description, pose)
         self._physics.add_robot(robot.description, pose, self.params.drive.traction)
         self._robot = robot
+
+    def spawn_near(self, description: RobotDescription, pose: Pose2D = HOME, reach: float = 10.0) -> Pose2D:
+        """Put the robot at a pose, or at the nearest free place with some room around it.
+
+        Args:
+            description: of the robot.
+            pose: the wanted one; its heading stays.
+            reach: how far away the place may be [m].
+
+        Returns:
+            Where it is.
+
+        Raises:
+            WorldError: there is a robot already, or no such place; the text says what stands at the wanted one.
+        """
+        try:
+            self.spawn_robot(description, pose)
+        except WorldError as err:
+            if self._robot is not None:
+                raise
+            for place in places_around(pose, reach):
+                if self._is_roomy(description, place):
+                    return place
+            raise err from None
+        return pose
+
+    def _is_roomy(self, description: RobotDescription, place: Pose2D) -> bool:
+        """Put the robot at a place, if it and its surroundings are free."""
+        try:
+            self.spawn_robot(description, place)
+        except WorldError:
+            return False
+        steps = (-_ROOM, 0.0, _ROOM)
+        around = (Pose2D(place.x + dx, place.y + dy, place.yaw) for dx in steps for dy in steps)
+        if any(self._physics.blocker_at(each) for each in around):
+            self.remove_robot()
+            return False
+        return True
 
     @property
     def robot(self) -> Equipment:

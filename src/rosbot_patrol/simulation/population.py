@@ -191,7 +191,7 @@ class Population:
             raise _robot_is_there(f"door '{name}'")
 
     def place_box(self, name: str, pose: Pose2D, size: tuple[float, float, float]) -> None:
-        """Put a box on the floor.
+        """Put a box on the floor: `place_thing` of that size.
 
         Args:
             name: unique in the world.
@@ -201,14 +201,27 @@ class Population:
         Raises:
             WorldError: the name is taken, or the robot stands there.
         """
-        if name in self or name in self._ways.names:
-            raise WorldError(f"box '{name}'", "the name is taken")
-        body = box_body(name, pose, size)
+        self.place_thing(box_body(name, pose, size), "box")
+
+    def place_thing(self, body: Body, what: str = "thing") -> None:
+        """Put a static body where it says.
+
+        Args:
+            body: with a name that is unique in the world.
+            what: it is, for messages.
+
+        Raises:
+            WorldError: the name is taken, or the robot stands there.
+        """
+        name = body.name
+        if not name or name in self or name in self._ways.names:
+            raise WorldError(f"{what} '{name}'", "the name is taken" if name else "has no name")
         was_free = self._physics.blocker() is None
         self._physics.add(body)
         if was_free and self._physics.blocker() == name:
             self._physics.remove(name)
-            raise WorldError(f"box '{name}'", f"cannot stand at ({pose.x:.2f}, {pose.y:.2f}), the robot is there")
+            x, y = body.pose[:2, 3]
+            raise WorldError(f"{what} '{name}'", f"cannot stand at ({x:.2f}, {y:.2f}), the robot is there")
         self.boxes[name] = body
         self._ways.add(body)
 

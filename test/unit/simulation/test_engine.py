@@ -16,7 +16,7 @@ from rosbot_patrol.simulation.robot.drive import DriveParams
 from rosbot_patrol.simulation.robot.odometry import OdometryParams
 from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
 from rosbot_patrol.simulation.scene.scene import Body, Collision, Shape
-from rosbot_patrol.simulation.sdf.world import load_world
+from rosbot_patrol.simulation.sdf.world import World, load_world
 from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
 
 ROOT = Path(__file__).parents[3]
@@ -275,3 +275,20 @@ def test_noise_does_not_depend_on_who_listened_before(build) -> None:
     for engine in engines:
         drive(engine, 0.1, 0.0, 0.5)
     assert np.array_equal(engines[0].scan().ranges, engines[1].scan().ranges)
+
+
+def test_a_start_that_is_taken_gives_the_nearest_free_place_with_room_around_it() -> None:
+    block = wall(0.0, 0.0, size=(1.0, 1.0), name="table")
+    engine = Engine(World(bodies=(block, wall(1.3, 0.0, name="wall"))))
+    robot = load_robot(ROOT / "urdf" / "rosbot.urdf")
+    place = engine.spawn_near(robot, Pose2D(0.0, 0.0, 1.0))
+    assert engine.pose == pytest.approx(place)
+    assert place.yaw == 1.0
+    assert math.hypot(place.x, place.y) == pytest.approx(1.0, abs=0.25)
+    assert place.x < 0.5  # not in the gap before the wall
+    engine.remove_robot()
+    with pytest.raises(WorldError, match="is no place for it, 'table' is there"):
+        engine.spawn_near(robot, reach=0.4)
+    assert engine.spawn_near(robot, Pose2D(-2.0, 0.0, 0.0)) == Pose2D(-2.0, 0.0, 0.0)
+    with pytest.raises(WorldError, match="is there already"):
+        engine.spawn_near(robot)

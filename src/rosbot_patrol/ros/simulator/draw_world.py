@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.patrol.house.rooms import load_rooms
-from rosbot_patrol.ros.simulator.packages import model_folders, package_finder
+from rosbot_patrol.ros.models.packages import model_folders, package_finder
 from rosbot_patrol.simulation.render.egl import make_renderer
 from rosbot_patrol.simulation.render.from_above import WorldPicture, draw_world
 from rosbot_patrol.simulation.sdf.world import load_world

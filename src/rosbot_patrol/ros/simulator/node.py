@@ -20,6 +20,7 @@ import dataclasses
 import logging
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import rospy
@@ -30,6 +31,7 @@ from rosbot_patrol.errors import ParamError, WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.params import param
 from rosbot_patrol.ros.messages.convert import twist_from_msg
+from rosbot_patrol.ros.models.packages import model_folders, package_finder
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.runtime.latest import Latest
 from rosbot_patrol.ros.runtime.node import load_params, now, run_node
@@ -38,7 +40,6 @@ from rosbot_patrol.ros.simulator.doors import DoorServices
 from rosbot_patrol.ros.simulator.faults import FaultServices
 from rosbot_patrol.ros.simulator.outputs import STEPS_PER_TICK, TICK, Outputs
 from rosbot_patrol.ros.simulator.pace import Lockstep, LockstepParams, Pace, SharedClock, refuse_second_clock
-from rosbot_patrol.ros.simulator.packages import model_folders, package_finder
 from rosbot_patrol.ros.simulator.readings import RateParams, Readings
 from rosbot_patrol.ros.simulator.requests import Requests
 from rosbot_patrol.ros.simulator.scenario import ScenarioRunner
@@ -118,10 +119,11 @@ class Simulator:
         world = load_world(p.world, folders, packages) if p.world else World()
         places = read_sensors(p.motion_sensors)
         self._params = p
-        self._engine = Engine(world, p.engine, sensors=places, make_renderer=lambda: make_renderer(p.camera.renderer))
+        renderer = partial(make_renderer, p.camera.renderer, p.camera.light)
+        self._engine = Engine(world, p.engine, sensors=places, make_renderer=renderer)
         if p.robot:
             robot = _description(p)
-            self._engine.spawn_robot(mounted(robot) if p.hardware.folder else robot, Pose2D(p.x, p.y, p.yaw))
+            self._place(mounted(robot) if p.hardware.folder else robot, is_given=scenario is not None)
         self._paused = p.paused
         self._tick = 0
         self._command: Latest[Twist] = Latest()
@@ -188,6 +190,18 @@ class Simulator:
         if self._hardware is not None:
             self._hardware.close()
         self._engine.close()
+
+    def _place(self, robot: RobotDescription, *, is_given: bool) -> None:
+        """Place the robot at its start; if nobody has said where, at the free place nearest to the origin."""
+        p = self._params
+        start = Pose2D(p.x, p.y, p.yaw)
+        if is_given or rospy.has_param("~x") or rospy.has_param("~y"):
+            self._engine.spawn_robot(robot, start)
+            return
+        place = self._engine.spawn_near(robot, start)
+        if place != start:
+            text = "because the origin is no place for it; x:= and y:= place it elsewhere"
+            rospy.logwarn("the robot starts at (%.2f, %.2f), %s", place.x, place.y, text)
 
     def _restart_pace(self) -> None:
         self._pace.restart(self._engine.now)
@@ -276,6 +290,7 @@ def _set_by(scenario: Scenario, p: SimulatorParams) -> SimulatorParams:
         world=setting.world or p.world,
         motion_sensors=setting.motion_sensors or p.motion_sensors,
         seed=p.seed if setting.seed is None else setting.seed,
+        camera=dataclasses.replace(p.camera, light=setting.light or p.camera.light),
         x=start.x,
         y=start.y,
         yaw=start.yaw,

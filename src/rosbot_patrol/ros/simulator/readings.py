@@ -129,7 +129,7 @@ class Readings:
 
     def _range_publisher(self, frame: str) -> rospy.Publisher:
         if frame not in self._ranges:
-            topic = f"range/{frame.removeprefix('range_')}"
+            topic = f"range/{frame.removeprefix('range_').removesuffix('_range')}"
             self._ranges[frame] = rospy.Publisher(topic, Range, queue_size=1)
         return self._ranges[frame]
 

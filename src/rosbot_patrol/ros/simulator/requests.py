@@ -6,6 +6,7 @@ import queue
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
+from dataclasses import replace
 from typing import Any
 
 import rospy
@@ -14,9 +15,11 @@ from std_srvs.srv import Empty, EmptyResponse, Trigger, TriggerResponse
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import PatrolError, WorldError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.ros.simulator.packages import package_finder
+from rosbot_patrol.ros.models.packages import model_folders, package_finder
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.robot.description import parse_robot
+from rosbot_patrol.simulation.scene.matrices import from_pose2d
+from rosbot_patrol.simulation.sdf.world import World, parse_model
 from rosbot_patrol.srv import (
     MoveActor,
     MoveActorRequest,
@@ -171,12 +174,51 @@ class Requests:
 
     def _spawn_robot(self, request: SpawnRobotRequest) -> SpawnRobotResponse:
         try:
-            robot = parse_robot(request.urdf, source=f"robot '{request.name}'", find_package=package_finder())
-            self.ask(lambda: self._engine.spawn_robot(robot, _pose(request.pose)))
+            what = self._spawn_sdf(request) if "<sdf" in request.urdf else self._spawn_urdf(request)
         except PatrolError as err:
             return SpawnRobotResponse(success=False, message=str(err))
-        rospy.loginfo("robot '%s' stands at (%.2f, %.2f)", request.name, request.pose.x, request.pose.y)
+        rospy.loginfo("%s '%s' stands at (%.2f, %.2f)", what, request.name, request.pose.x, request.pose.y)
         return SpawnRobotResponse(success=True, message="")
+
+    def _spawn_urdf(self, request: SpawnRobotRequest) -> str:
+        source = request.file or f"robot '{request.name}'"
+        robot, pose = parse_robot(request.urdf, source=source, find_package=package_finder()), _pose(request.pose)
+        drive = self._engine.params.drive
+        if (robot.left or drive.left_joints) and (robot.right or drive.right_joints):
+            self.ask(lambda: self._engine.spawn_robot(robot, pose))
+            return "robot"
+        world_from_thing = from_pose2d(pose, request.z)
+        thing = replace(robot.body, name=request.name, kind="furniture", static=True, pose=world_from_thing)
+        if not thing.visuals and not thing.collisions:
+            raise WorldError(source, "has neither wheels to drive by nor any shape")
+        self.ask(lambda: self._engine.population.place_thing(thing))
+        return "thing"
+
+    def _spawn_sdf(self, request: SpawnRobotRequest) -> str:
+        p = request.pose
+        found = parse_model(
+            request.urdf,
+            request.name,
+            (p.x, p.y, request.z, 0.0, 0.0, p.theta),
+            source=request.file,
+            model_path=model_folders(),
+            find_package=package_finder(),
+        )
+        self.ask(lambda: self._place_all(found))
+        return "model"
+
+    def _place_all(self, model: World) -> None:
+        """Place the parts of a model; if one cannot stand there, none does."""
+        population, placed = self._engine.population, []
+        try:
+            for body in model.bodies:
+                population.place_thing(body, "model")
+                placed.append(body.name)
+        except WorldError:
+            for name in placed:
+                population.remove_box(name)
+            raise
+        population.begin(model.actors, model.doors)
 
 
 def _pose(msg: Any) -> Pose2D:

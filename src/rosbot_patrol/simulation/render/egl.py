@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.render.lights import LIGHTS, Light
 from rosbot_patrol.simulation.render.shaders import sources
 from rosbot_patrol.simulation.render.shadows import Shadows, shadow_of
 from rosbot_patrol.simulation.render.vertices import MAX_PARTS, VERTEX, Triangles, placed, vertices_of
@@ -24,29 +25,7 @@ from rosbot_patrol.simulation.sensors import picture_kernels as kernels
 
 log = logging.getLogger(__name__)
 
-Vec3 = tuple[float, float, float]
 _SHADOWS_SEEN = 15.0  # farther shadows are too small to be seen [m]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Light:
-    """Lights of a scene; their colours add up, and a sum of about 1 is full light.
-
-    Attributes:
-        sun_direction: towards the sun, of any length.
-        above, below: light on faces that look up and down, interpolated between.
-        lamp_place: position of a lamp [m]; its light falls to a half at `lamp_reach` [m].
-        sky: background colour.
-    """
-
-    sun_direction: Vec3 = (-0.55, -0.35, 0.75)
-    sun: Vec3 = (0.36, 0.35, 0.33)
-    above: Vec3 = (0.68, 0.69, 0.72)
-    below: Vec3 = (0.44, 0.43, 0.41)
-    lamp_place: Vec3 = (0.0, 0.0, 2.4)
-    lamp: Vec3 = (0.0, 0.0, 0.0)
-    lamp_reach: float = 4.0
-    sky: Vec3 = (0.72, 0.80, 0.90)
 
 
 _Programs = dict[tuple[bool, bool], Any]
@@ -204,7 +183,7 @@ class EglRenderer(SceneRenderer):
             _set(program, "view", np.linalg.inv(world_from_optical).T)
             _set(program, "projection", _projection(intrinsics).T)
             _set(program, "eye", world_from_optical[:3, 3])
-            self._set_light(program, lamp)
+            self._set_light(program, world_from_optical[:3, 3], lamp)
         # Moving bodies are usually in front of static ones: drawn first, they save the fragments behind them. A pass
         # for depth alone, to shade only visible fragments, cost more than it saved.
         for item in self._items.values():
@@ -257,13 +236,14 @@ class EglRenderer(SceneRenderer):
         drawn.arrays[program].render()
         self._context.disable(self._context.CULL_FACE)
 
-    def _set_light(self, program: Any, lamp: bool) -> None:
+    def _set_light(self, program: Any, eye: Matrix, lamp: bool) -> None:
         light = self.light
         towards = np.array(light.sun_direction, float)
         _set(program, "sun_direction", towards / max(float(np.linalg.norm(towards)), 1e-9))
-        for name in ("sun", "above", "below", *(("lamp_place", "lamp") if lamp else ())):
+        for name in ("sun", "above", "below", *(("lamp",) if lamp else ())):
             _set(program, name, np.array(getattr(light, name)))
         if lamp:
+            _set(program, "lamp_place", eye if light.is_lamp_carried else np.array(light.lamp_place))
             _set(program, "lamp_reach", np.array(1.0 / light.lamp_reach**2))
 
     def _vertices(self, body: Body, index: int, label: int) -> Triangles:
@@ -337,11 +317,16 @@ class EglRenderer(SceneRenderer):
         item.drawn = []
 
 
-def make_renderer(prefer: str = "egl") -> SceneRenderer:
-    """Make the machine's fastest renderer: OpenGL on EGL, else PyBullet's own, with a warning that says why."""
+def make_renderer(prefer: str = "egl", light: str = "day") -> SceneRenderer:
+    """Make the machine's fastest renderer: OpenGL on EGL, else PyBullet's own, with a warning that says why.
+
+    Args:
+        prefer: egl or tiny.
+        light: one of LIGHTS; PyBullet's renderer has its own.
+    """
     if prefer == "egl":
         try:
-            renderer = EglRenderer()
+            renderer = EglRenderer(LIGHTS[light])
         except WorldError as err:
             log.warning("the camera is drawn by PyBullet's TinyRenderer, some 20 times slower: %s", err)
         else:

@@ -9,12 +9,14 @@ all joints at zero.
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.params import param
 from rosbot_patrol.simulation.robot.urdf import FindPackage, Joint, Urdf, lateral, read_urdf
@@ -28,6 +30,10 @@ _MIDDLE = 1e-3  # a wheel closer to the middle is on no side [m]
 _LASER = ("laser", "lidar", "scan")
 _CAMERA = ("camera", "kinect", "realsense", "astra")
 _COLOUR = ("rgb", "color", "colour")
+_RANGE = {"range", "sonar", "ultrasonic"}
+_RAYS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
+_FAN = 1.0  # a sensor with a narrower fan of beams measures one distance, and is no lidar [rad]
+_STANDS = 0.01  # a base this much below its wheels' axles stands on the floor [m]
 # Rows: the camera's axes (x right, y down, z forward) in a frame with x forward, y left, z up.
 _BODY_FROM_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
@@ -189,9 +195,13 @@ def parse_robot(
         find_package: folder of a package or model by name, None if it is unknown.
 
     Raises:
-        WorldError: it is not URDF, its joints form no tree, a number is invalid, or a mesh is missing.
+        WorldError: it is not URDF, its joints form no tree, or a number is invalid.
     """
     urdf = read_urdf(text, source, find_package)
+    for sentence in urdf.lost:
+        log.warning("%s", sentence)
+    if urdf.lost:
+        log.warning("%s: %s left out", source, count_of(len(urdf.lost), "mesh is", "meshes are"))
     frames = urdf.frames()
     visuals = [replace(v, pose=frames[n] @ v.pose) for n, link in urdf.links.items() for v in link.visuals]
     collisions = [replace(c, pose=frames[n] @ c.pose) for n, link in urdf.links.items() for c in link.collisions]
@@ -209,11 +219,7 @@ def parse_robot(
         laser=_laser(urdf, frames),
         camera=_camera(urdf, frames),
         imu=_imu(urdf, frames),
-        ranges=tuple(
-            Mount(frame=n, pose=frames[n])
-            for n in urdf.links
-            if n.startswith("range_") or "sonar" in n or "ultrasonic" in n
-        ),
+        ranges=_ranges(urdf, frames),
     )
 
 
@@ -245,6 +251,11 @@ def _sides(urdf: Urdf, frames: dict[str, Matrix]) -> tuple[tuple[str, ...], tupl
 def _hinge(joint: Joint, urdf: Urdf, frames: dict[str, Matrix]) -> Hinge:
     pose, link = frames[joint.child], urdf.links[joint.child]
     radius, middle = _wheel(link.collisions or link.visuals, joint.axis, pose)
+    if not radius and joint.kind == "continuous" and pose[2, 3] > _STANDS:
+        radius = float(pose[2, 3])
+        log.warning(
+            "wheel '%s' has no shape: its radius is its height above '%s', %.3f m", joint.name, urdf.root, radius
+        )
     return Hinge(
         joint=joint.name,
         radius=radius,
@@ -278,12 +289,19 @@ def _named(urdf: Urdf, words: Iterable[str]) -> list[str]:
 
 def _laser(urdf: Urdf, frames: dict[str, Matrix]) -> Mount | None:
     for tag in urdf.sensors:
-        if tag.kind in ("ray", "gpu_ray"):
+        if tag.kind in _RAYS and tag.fan >= _FAN:
             frame = tag.frame if tag.frame in frames else tag.link
             return Mount(frame=frame, pose=frames[tag.link] @ tag.pose)
     names = _named(urdf, _LASER)
     best = next((n for n in ("laser", "laser_frame", "base_scan") if n in names), names[0] if names else None)
     return None if best is None else Mount(frame=best, pose=frames[best])
+
+
+def _ranges(urdf: Urdf, frames: dict[str, Matrix]) -> tuple[Mount, ...]:
+    """The range sensors: links of that name, and those with a sensor that has a narrow fan of beams."""
+    narrow = {tag.link for tag in urdf.sensors if tag.kind == "sonar" or (tag.kind in _RAYS and tag.fan < _FAN)}
+    named = [name for name in urdf.links if name in narrow or _RANGE & set(re.split("[^a-z]+", name.lower()))]
+    return tuple(Mount(frame=name, pose=frames[name]) for name in named)
 
 
 def _camera(urdf: Urdf, frames: dict[str, Matrix]) -> Mount | None:

@@ -1,7 +1,8 @@
 """Reader of URDF: links with their shapes, joints with their axes, and the tree that they form.
 
-Meshes are found by ROS's and Gazebo's names (package://, model://, file://, or a path beside the file). Of the <gazebo>
-extensions only the places of the sensors and the joints of a differential or skid-steer drive are read.
+Meshes are found by ROS's and Gazebo's names (package://, model://, file://, or a path beside the file). One that is
+missing or broken is left out, as in Gazebo; a link without any other visual shows its collision shapes. Of the <gazebo>
+extensions only the sensors and the joints of a differential or skid-steer drive are read.
 """
 
 from __future__ import annotations
@@ -55,23 +56,39 @@ class Joint:
 
 @dataclass(frozen=True, kw_only=True)
 class SensorTag:
-    """A <sensor> of a <gazebo> extension: its type, its link, its place there, the frame of its messages."""
+    """A <sensor> of a <gazebo> extension.
+
+    Attributes:
+        kind: its type.
+        link: its link; pose: its place there.
+        frame: of its messages, "" for the link's.
+        fan: angle between its outermost beams [rad], a full turn if the file does not say.
+    """
 
     kind: str
     link: str
     pose: Matrix
     frame: str
+    fan: float = math.tau
 
 
 @dataclass(frozen=True, kw_only=True)
 class Urdf:
-    """A robot's links and joints; `root` is the link without a parent joint, `drive` the joints of a drive plug-in."""
+    """A robot's links and joints.
+
+    Attributes:
+        root: the link without a parent joint.
+        sensors: those of the <gazebo> extensions.
+        lost: a sentence for each mesh that cannot be used.
+        drive: joints of a drive plug-in, left and right.
+    """
 
     name: str
     root: str
     links: dict[str, Link]
     joints: tuple[Joint, ...]
     sensors: tuple[SensorTag, ...]
+    lost: tuple[str, ...] = ()
     drive: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def frames(self) -> dict[str, Matrix]:
@@ -97,7 +114,7 @@ def read_urdf(text: str, source: str, find_package: FindPackage) -> Urdf:
         find_package: folder of a package or model by name, None if it is unknown.
 
     Raises:
-        WorldError: it is not URDF, its joints form no tree, a number is invalid, or a mesh is missing.
+        WorldError: it is not URDF, its joints form no tree, or a number is invalid.
     """
     try:
         root = ET.fromstring(text)
@@ -114,6 +131,7 @@ class _Reader:
     root: ET.Element
     find_package: FindPackage
     colours: dict[str, Rgba] = field(default_factory=dict)
+    lost: dict[str, None] = field(default_factory=dict)
 
     def read(self) -> Urdf:
         for material in self.root.findall("material"):
@@ -132,6 +150,7 @@ class _Reader:
             links=links,
             joints=joints,
             sensors=tuple(self._sensors(links)),
+            lost=tuple(self.lost),
             drive=(self._driven("left", joints), self._driven("right", joints)),
         )
         lost = set(links) - set(urdf.frames())
@@ -141,11 +160,14 @@ class _Reader:
 
     def _link(self, element: ET.Element) -> Link:
         name = element.get("name", "")
-        visuals = [v for e in element.findall("visual") for v in self._visuals(e, name)]
         collisions = [
             Collision(shape=shape, pose=self._origin(e)) for e in element.findall("collision")
             for shape, _ in self._shapes(e, name)
         ]  # fmt: skip
+        listed = element.findall("visual")
+        visuals = [v for e in listed for v in self._visuals(e, name)]
+        if listed and not visuals:
+            visuals = [Visual(shape=c.shape, pose=c.pose, material=Material(rgba=_GREY)) for c in collisions]
         mass = element.find("inertial/mass")
         weight = self._numbers(mass.get("value", "0"), 1, f"link '{name}', mass")[0] if mass is not None else 0.0
         return Link(name=name, visuals=tuple(visuals), collisions=tuple(collisions), mass=weight)
@@ -228,7 +250,8 @@ class _Reader:
         try:
             parts = load_parts(self._find(name))
         except WorldError as err:
-            raise WorldError(self.source, f"{where} '{name}': {err}") from err
+            self.lost[f"{self.source}: {where} '{name}': {err}"] = None
+            return []
         return [(Shape(kind="mesh", size=scale, vertices=part.vertices, faces=part.faces), part.rgba) for part in parts]
 
     def _find(self, name: str) -> Path:
@@ -257,7 +280,8 @@ class _Reader:
             link = extension.get("reference", "")
             for sensor in extension.findall("sensor") if link in links else ():
                 text = sensor.findtext("pose", "").strip() or "0 0 0 0 0 0"
-                numbers = self._numbers(text, 6, f"sensor '{sensor.get('name', '')}', pose")
+                where = f"sensor '{sensor.get('name', '')}'"
+                numbers = self._numbers(text, 6, f"{where}, pose")
                 frame = (sensor.findtext("plugin/frameName") or sensor.findtext("plugin/frame_name") or "").strip()
                 found.append(
                     SensorTag(
@@ -265,17 +289,27 @@ class _Reader:
                         link=link,
                         pose=from_xyz_rpy(numbers[:3], numbers[3:]),
                         frame=frame.lstrip("/"),
+                        fan=self._fan(sensor, where),
                     )
                 )
         return found
 
+    def _fan(self, sensor: ET.Element, where: str) -> float:
+        """Angle between the outermost beams of a <ray> sensor [rad]."""
+        scan = next(sensor.iter("horizontal"), None)
+        low, high = (scan.findtext(f"{end}_angle") if scan is not None else None for end in ("min", "max"))
+        if low is None or high is None:
+            return math.tau
+        (first,), (last,) = (self._numbers(text.strip(), 1, f"{where}, angle") for text in (low, high))
+        return abs(last - first)
+
     def _driven(self, side: str, joints: tuple[Joint, ...]) -> tuple[str, ...]:
-        """Joints that the drive plug-in names for a side (leftJoint, leftFrontJoint, left_joint, ...)."""
+        """Joints that the drive plug-in names for a side (leftJoint, leftFrontJoint, front_left_joint, ...)."""
         known = {joint.name for joint in joints}
         named = [
             (e.text or "").strip()
             for e in self.root.iterfind("gazebo/plugin/*")
-            if e.tag.lower().startswith(side) and e.tag.lower().endswith("joint")
+            if side in e.tag.lower() and e.tag.lower().endswith("joint")
         ]
         return tuple(dict.fromkeys(name for name in named if name in known))
 

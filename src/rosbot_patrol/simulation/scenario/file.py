@@ -24,6 +24,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.params import param
 from rosbot_patrol.simulation.actors.doors import SPEED, SWING, DoorPlace, plain_door
 from rosbot_patrol.simulation.actors.walkers import Walker
+from rosbot_patrol.simulation.render.lights import LIGHTS
 from rosbot_patrol.simulation.scenario.faults import EVENTS, Doorway, Fault, Timed, finite, read_fault
 from rosbot_patrol.yaml_files import read_mapping
 
@@ -151,6 +152,7 @@ class Setting:
     motion_sensors: str = param("", doc="file of the motion sensors")
     map: str = param("", doc="yaml file of the map")
     room_points: str = param("", doc="points file of the rooms")
+    light: str = param("", choices=("", *LIGHTS), doc="light of the scene: day, noon, evening, lamps or torch")
     seed: int | None = param(None, lo=0, doc="seed of all noise")
     begin: str = param("on_guard", choices=EVENTS, doc="event from which times count if an entry has no `after`")
 

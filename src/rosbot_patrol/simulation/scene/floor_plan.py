@@ -31,13 +31,21 @@ def floor_plan(bodies: Iterable[Body], info: GridInfo, *, height: float, start: 
     Raises:
         MapError: the start is off the map or in a wall.
     """
-    info.require_aligned("floor plan")
-    slices = [cut for body in bodies if body.static for cut in _slices(body, height)]
-    passed, filled = surface_cells(info, slices)
+    passed, filled = _cells(bodies, info, height)
     ix, iy = info.cell_of(*start)
     if not info.contains_cell(ix, iy) or filled[iy, ix]:
         raise MapError("floor plan", f"the start ({start[0]:.2f}, {start[1]:.2f}) is off the map or in a wall")
     return Grid(info, seen_map(passed, filled, ix, iy))
+
+
+def filled_cells(bodies: Iterable[Body], info: GridInfo, height: float) -> NDArray[np.bool_]:
+    """Cells in which static bodies stand at a height [m], shape of the grid."""
+    return _cells(bodies, info, height)[1]
+
+
+def _cells(bodies: Iterable[Body], info: GridInfo, height: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    info.require_aligned("floor plan")
+    return surface_cells(info, [cut for body in bodies if body.static for cut in _slices(body, height)])
 
 
 def _slices(body: Body, height: float) -> list[NDArray[np.float64]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import re
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -76,8 +75,10 @@ class Reader:
     def __post_init__(self) -> None:
         self._shapes = ShapeReader(self.model_path, self.skipped, self.lost)
 
-    def read(self) -> str:
-        """Read the file; returns the world's name. Raises WorldError."""
+    def read(self, root: ET.Element | None = None) -> str:
+        """Read the file, or `root` instead; returns the world's name. Raises WorldError."""
+        if root is not None:
+            self._files[self.path] = root
         place = Place(self.path)
         worlds = self._parse(self.path).findall("world")
         if not worlds:
@@ -91,7 +92,6 @@ class Reader:
         self._note_skipped(world)
         for child in (*world, *self._state.inserted):
             self._child(child, place, frames, identity(), "")
-        self._check_names()
         return world.get("name", "world")
 
     def _child(self, child: ET.Element, place: Place, frames: Frames, world_from_outer: Matrix, outer: str) -> None:
@@ -225,7 +225,7 @@ class Reader:
             kind = kind_of(name, label, body.collisions)
             hinge = read_hinge(model, label, frames, pose @ inverse(model_from_link), here)
             hinge = hinge if body.collisions else None
-            body_name = name if len(links) == 1 else f"{name}/{label}"
+            body_name = name if len(links) == 1 else self._fresh(f"{name}/{label}")
             built.append((label, replace(body, name=body_name, kind=kind, pose=pose, static=hinge is None), hinge))
         carried: set[str] = set()
         for label, body, hinge in built:
@@ -268,12 +268,6 @@ class Reader:
             self.renamed.append(name)
         self._taken.add(name)
         return name
-
-    def _check_names(self) -> None:
-        names = [b.name for b in self.bodies] + [a.name for a in self.actors] + [d.body.name for d in self.doors]
-        twice = [name for name, count in Counter(names).items() if count > 1]
-        if twice:
-            raise WorldError(self.path, f"the name '{twice[0]}' is used twice")
 
     def _note_skipped(self, element: ET.Element) -> None:
         self.lights += sum(child.tag == "light" for child in element)

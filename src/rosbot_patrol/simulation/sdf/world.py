@@ -19,8 +19,10 @@ import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 from rosbot_patrol.counts import count_of
+from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.actors.doors import DoorPlace
 from rosbot_patrol.simulation.scene.scene import Body
 from rosbot_patrol.simulation.sdf.actors import ActorPlace
@@ -28,8 +30,9 @@ from rosbot_patrol.simulation.sdf.bodies import let_down, raised_floor
 from rosbot_patrol.simulation.sdf.files import ModelPath
 from rosbot_patrol.simulation.sdf.reader import Reader
 from rosbot_patrol.simulation.sdf.values import VERSIONS
+from rosbot_patrol.simulation.sdf.xml import parse_sdf
 
-__all__ = ["ActorPlace", "World", "load_world"]
+__all__ = ["ActorPlace", "World", "load_world", "parse_model"]
 
 log = logging.getLogger(__name__)
 
@@ -47,6 +50,48 @@ class World:
     actors: tuple[ActorPlace, ...] = ()
     doors: tuple[DoorPlace, ...] = ()
     lost: tuple[str, ...] = ()
+
+
+def parse_model(
+    text: str,
+    name: str,
+    pose: tuple[float, ...],
+    *,
+    source: str = "",
+    model_path: Iterable[str | Path] = (),
+    find_package: Callable[[str], Path | None] | None = None,
+) -> World:
+    """Read one model of SDF, as a world with nothing else.
+
+    Args:
+        text: the SDF, with a <model>.
+        name: of the model.
+        pose: x, y, z [m] and roll, pitch, yaw [rad]; takes the place of the model's own.
+        source: file of the text, for messages and relative names.
+        model_path: as for `load_world`.
+        find_package: as for `load_world`.
+
+    Raises:
+        WorldError: as for `load_world`.
+    """
+    path = Path(source or name)
+    found = parse_sdf(text.encode(), path)
+    model = found.find("model") if found.find("model") is not None else found.find("world/model")
+    if model is None:
+        raise WorldError(path, "has no <model> element")
+    for old in model.findall("pose"):
+        model.remove(old)
+    model.set("name", name)
+    ET.SubElement(model, "pose").text = " ".join(map(str, pose))
+    root = ET.Element("sdf", version=found.get("version", VERSIONS[-1]))
+    ET.SubElement(root, "world", name=name).append(model)
+    reader = Reader(path, ModelPath(tuple(map(Path, model_path)), find_package))
+    reader.read(root)
+    _tell(reader)
+    lost = reader.lost.sentences()
+    return World(
+        name=name, bodies=tuple(reader.bodies), actors=tuple(reader.actors), doors=tuple(reader.doors), lost=lost
+    )
 
 
 def load_world(

@@ -42,6 +42,11 @@ class CameraParams:
         0.025, unit="s", lo=-0.2, hi=0.2, doc="time from the first row to the last; a turn slants the colours"
     )
     jpeg_quality: int = param(80, lo=0, hi=100, doc="compression of the colours, as of a USB camera; 0: none")
+    light: str = param(
+        "day",
+        choices=("day", "noon", "evening", "lamps", "torch"),
+        doc="light of the scene; torch: the robot carries the only lamp",
+    )
     renderer: str = param("egl", choices=("egl", "tiny"), doc="egl: OpenGL without a display; tiny: PyBullet's own")
 
     @property

@@ -191,11 +191,6 @@ def test_a_drive_s_plug_in_tells_which_wheels_are_driven() -> None:
         (two_wheels().replace("0 0.1 0", "0 up 0"), "expected 3 numbers"),
         (two_wheels().replace("cylinder radius='0.05'", "cone radius='0.05'"), "unknown geometry <cone>"),
         (two_wheels().replace("radius='0.05'", "radius='-1'"), "negative size"),
-        (two_wheels().replace("<cylinder radius='0.05' length='0.02'/>", "<mesh filename='no.stl'/>"), "no.stl"),
-        (
-            two_wheels().replace("<cylinder radius='0.05' length='0.02'/>", "<mesh filename='package://far/a.stl'/>"),
-            "link 'left', mesh 'package://far/a.stl': package 'far': is not found",
-        ),
     ],
 )
 def test_what_cannot_be_driven_is_told(text: str, words: str) -> None:
@@ -217,5 +212,38 @@ def test_meshes_are_found_by_package_by_model_and_beside_the_file(tmp_path: Path
 
     assert load_robot(path, find).wheel_radius == pytest.approx(0.033, abs=1e-5)
     assert set(asked) == {"bot"}
-    with pytest.raises(WorldError, match=r"bot\.urdf.*package 'bot': is not found"):
-        load_robot(path)
+
+
+def test_a_robot_whose_meshes_are_missing_drives_on_what_is_left(caplog: pytest.LogCaptureFixture) -> None:
+    lost = two_wheels().replace("<cylinder radius='0.05' length='0.02'/>", "<mesh filename='package://far/a.stl'/>")
+    body = "<link name='base'><visual><geometry><mesh filename='no.stl'/></geometry></visual>{}</link>".format(
+        "<collision><geometry><box size='0.3 0.2 0.1'/></geometry></collision>"
+    )
+    robot = parse_robot(
+        lost.replace("<link name='base'/>", body).replace("0 0.1 0", "0 0.1 0.04").replace("0 -0.1 0", "0 -0.1 0.04")
+    )
+    assert "link 'left', mesh 'package://far/a.stl': package 'far': is not found" in caplog.text
+    assert "3 meshes are left out" in caplog.text
+    assert [v.shape.kind for v in robot.body.visuals] == ["box"]  # the base shows its collision shape
+    assert robot.wheel_radius == pytest.approx(0.04)  # the base stands on the floor
+    assert "wheel 'left_joint' has no shape" in caplog.text
+    engine = Engine(World())
+    engine.spawn_robot(robot)
+    drive(engine, 0.2, 0.0, 1.0)
+    assert engine.pose.x > 0.1
+    engine.close()
+
+
+def test_today_s_rosbot_has_range_sensors_that_are_no_lidar() -> None:
+    """Names and sensors as in husarion/rosbot_ros: a lidar with one beam is a range sensor."""
+    joint = "<joint name='{0}_j' type='fixed'><parent link='base'/><child link='{0}'/></joint><link name='{0}'/>"
+    ray = (
+        "<gazebo reference='{0}'><sensor type='{1}' name='{0}'><ray><scan><horizontal><samples>1</samples>"
+        "<min_angle>{2}</min_angle><max_angle>{3}</max_angle></horizontal></scan></ray></sensor></gazebo>"
+    )
+    extra = "".join(joint.format(n) for n in ("fl_range", "fr_range", "tof", "orange", "laser"))
+    extra += ray.format("fl_range", "gpu_lidar", -0.01, 0.01) + ray.format("tof", "ray", -0.2, 0.2)
+    robot = parse_robot(two_wheels(extra + ray.format("laser", "gpu_lidar", -3.14, 3.14)))
+    assert robot.laser is not None
+    assert robot.laser.frame == "laser"
+    assert [m.frame for m in robot.ranges] == ["fl_range", "fr_range", "tof"]

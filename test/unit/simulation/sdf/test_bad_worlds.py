@@ -81,7 +81,6 @@ SEEN = "model 'm', link 'l', visual 'c'"
         ),
         (sdf(model("<link name='l'><pose>0 0 0 0 0 nan</pose></link>")), "link 'l', <pose>: expected 6 numbers"),
         (sdf("<model><link name='l'/></model>"), "a <model> has no name"),
-        (sdf(model("<link name='l'/><link name='l'/>")), "the name 'm/l' is used twice"),
         (
             sdf(model("<link name='l'/>") + "<state><model name='m'><pose>1 2</pose></model></state>"),
             "state of model 'm', <pose>: expected 6 numbers, got '1 2'",

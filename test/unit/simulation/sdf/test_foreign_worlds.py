@@ -17,7 +17,7 @@ from rosbot_patrol.simulation.robot.description import load_robot
 from rosbot_patrol.simulation.scene.matrices import to_pose2d
 from rosbot_patrol.simulation.scene.scene import Body
 from rosbot_patrol.simulation.scene.slices import slice_bodies
-from rosbot_patrol.simulation.sdf.world import World, load_world
+from rosbot_patrol.simulation.sdf.world import World, load_world, parse_model
 
 DATA = Path(__file__).parents[1] / "data"
 ROBOT = Path(__file__).parents[4] / "urdf" / "rosbot.urdf"
@@ -79,10 +79,14 @@ WORLD = sdf(model(f"<collision name='c'>{BOX}</collision>"))
         WORLD + "\n<!-- the end -->\n",
         WORLD.replace("<world", "<!-- was <xacro:include filename='a'/> --><world"),
         WORLD.replace("</model>", "<plugin name='p'><origin pose='0 0 0 0 0 0'/></plugin></model>"),
+        WORLD.replace("<world", "<author>Smith & Sons &c. &amp; more</author><world"),
+        WORLD.replace("<world", "<!-- caf\xe9 --><author>caf\xe9</author><world").encode("latin-1"),
+        WORLD.replace("<world", "<author>bell \x07</author><world"),
+        WORLD + "\n</sdf>\nleft over",
     ],
     ids=[
         "comment first", "empty lines first", "byte order mark", "utf-16", "dashes", "prefix", "gazebo", "trailing",
-        "macro in a comment", "origin of a plugin",
+        "macro in a comment", "origin of a plugin", "bare ampersand", "latin-1", "control character", "behind the end",
     ],
 )  # fmt: skip
 def test_xml_that_gazebo_reads_is_read(tmp_path: Path, text: str | bytes) -> None:
@@ -139,6 +143,24 @@ def test_two_models_of_one_name_both_stand_there(tmp_path: Path, caplog: pytest.
         world = read(tmp_path, sdf(one.format(1) + one.format(2) + state))
     assert [(b.name, b.pose[0, 3]) for b in world.bodies] == [("crate", 5.0), ("crate_1", 2.0)]
     assert "names used twice, the later one is called: crate_1" in caplog.text
+
+
+def test_two_links_of_one_name_are_both_there(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    link = f"<link name='leg'><pose>{{}} 0 0 0 0 0</pose><collision name='c'>{BOX}</collision></link>"
+    with caplog.at_level(logging.WARNING):
+        world = read(tmp_path, sdf(f"<model name='table'>{link.format(1)}{link.format(2)}</model>"))
+    assert [(b.name, b.pose[0, 3]) for b in world.bodies] == [("table/leg", 1.0), ("table/leg_1", 2.0)]
+    assert "the later one is called: table/leg_1" in caplog.text
+
+
+def test_a_model_s_text_is_a_world_of_its_own(tmp_path: Path) -> None:
+    chair = model(both("<box><size>1 1 1</size></box>"), more="<pose>9 9 9 0 0 0</pose>")
+    text = f"<sdf version='1.6'>{chair}</sdf>"
+    world = parse_model(text, "chair_7", (1.0, 2.0, 0.5, 0.0, 0.0, 1.57))
+    assert [(b.name, *to_pose2d(b.pose)) for b in world.bodies] == [("chair_7", 1.0, 2.0, pytest.approx(1.57))]
+    assert world.bodies[0].pose[2, 3] == 0.5
+    with pytest.raises(WorldError, match="has no <model> element"):
+        parse_model("<sdf version='1.6'/>", "nothing", (0.0,) * 6)
 
 
 def test_links_of_a_state_may_bear_the_name_of_their_model(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import rospkg
 
 from rosbot_patrol.simulation.robot.urdf import FindPackage
+from rosbot_patrol.simulation.sdf.world import World, load_world
 
 
 def model_folders(more: Iterable[str] = ()) -> list[str]:
@@ -32,3 +34,9 @@ def package_finder(folders: Sequence[str] = ()) -> FindPackage:
             return None
 
     return find
+
+
+@functools.lru_cache(maxsize=4)  # a campaign asks several times; its warnings need not be repeated
+def read_world(path: Path) -> World:
+    """Read a world with Gazebo's folders of models and ROS's packages. Raises WorldError."""
+    return load_world(path, model_folders(), package_finder())

@@ -1,0 +1,1 @@
+"""Gazebo models and ROS packages by name."""

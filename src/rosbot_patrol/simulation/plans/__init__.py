@@ -1,0 +1,1 @@
+"""Plans of houses, worlds made of them, and plans drawn by chance."""
