@@ -62,17 +62,6 @@ def bounds_of(found: Grid, around: float = 1.0) -> Bounds:
     return at[0], at[1]
 
 
-def known_part(grid: Grid) -> Grid:
-    """The known part of a map with a margin of one metre."""
-    (x, y), (x1, y1) = bounds_of(grid)
-    info = grid.info
-    ix, iy = round((x - info.origin_x) / info.resolution), round((y - info.origin_y) / info.resolution)
-    width, height = round((x1 - x) / info.resolution), round((y1 - y) / info.resolution)
-    cells = grid.cells[max(iy, 0) : iy + height, max(ix, 0) : ix + width]
-    corner = {"origin_x": max(x, info.origin_x), "origin_y": max(y, info.origin_y)}
-    return Grid(GridInfo(resolution=info.resolution, width=cells.shape[1], height=cells.shape[0], **corner), cells)
-
-
 def map_figures(found: Grid, world: Path, bounds: Bounds | None = None) -> MapFigures:
     """Compare a map's walls with the true ones."""
     bounds = bounds or bounds_of(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Sequence
 from html import escape
 
@@ -62,7 +63,7 @@ def spread_chart(rows: Sequence[tuple[str, Sequence[float], float | None]], unit
             off = ((k * 7) % 11 - 5) * 0.9  # offset, so that equal values stay visible
             kind = "wrong" if bound is not None and value > bound else "well"
             parts.append(f'<circle class="mark {kind}" cx="{_x(value, most):.1f}" cy="{y + off:.1f}" r="3"/>')
-        middle = sorted(values)[len(values) // 2]
+        middle = statistics.median(values)
         parts.append(_stroke("median", _x(middle, most), y))
         if bound is not None:
             parts.append(_stroke("bound", _x(bound, most), y))

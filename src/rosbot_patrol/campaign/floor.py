@@ -8,13 +8,15 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.maps.raster import flood
+from rosbot_patrol.maps.raster import flood, grown
 from rosbot_patrol.patrol.house.floor import floor_of
 from rosbot_patrol.patrol.house.regions import NOBODYS, part_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
@@ -55,7 +57,7 @@ class Floor:
     def __init__(self, bodies: Sequence[Body], rooms: Rooms) -> None:
         self.rooms = rooms
         self.bodies = tuple(bodies)
-        self.info = _info_of(bodies)
+        self.info = floor_info(bodies)
         start = (rooms.base.pose.x, rooms.base.pose.y)
         self.ways = Ways(bodies)
         self._sight = Sight(bodies)
@@ -198,17 +200,19 @@ class Floor:
 def shrunk(mask: Mask, radius: float) -> Mask:
     """Cells of a mask farther than a radius [m] from all cells outside it."""
     reach = math.ceil(radius / CELL)
-    padded = np.pad(mask, reach)
-    kept = mask.copy()
-    for dy in range(-reach, reach + 1):
-        for dx in range(-reach, reach + 1):
-            if math.hypot(dx, dy) * CELL <= radius:
-                kept &= padded[reach + dy : reach + dy + mask.shape[0], reach + dx : reach + dx + mask.shape[1]]
+    kept: Mask = ~grown(~np.pad(mask, reach), radius / CELL)[reach:-reach, reach:-reach]
     return kept
 
 
-def _info_of(bodies: Sequence[Body]) -> GridInfo:
+def floor_info(bodies: Sequence[Body], source: str | Path = "the world") -> GridInfo:
+    """Grid that holds a world's walls with a margin.
+
+    Raises:
+        WorldError: nothing in it is as high as a wall.
+    """
     ends = np.vstack([slice_bodies(bodies, EYE_LEVEL).segments.reshape(-1, 2)])
+    if not len(ends):
+        raise WorldError(source, f"has no walls: nothing in it is {EYE_LEVEL:g} m high, so there are no rooms to guard")
     low, high = ends.min(axis=0) - 0.3, ends.max(axis=0) + 0.3
     width, height = (math.ceil(v / CELL) for v in high - low)
     return GridInfo(resolution=CELL, width=width, height=height, origin_x=float(low[0]), origin_y=float(low[1]))

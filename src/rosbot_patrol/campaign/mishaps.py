@@ -1,8 +1,9 @@
 """Faults in the patrols of a campaign, and the verdicts that they excuse.
 
-Every other patrol has one fault of the simulator (docs/scenarios.md) that begins while the robot drives or looks; most
-last for some seconds. A guard with a failed camera may say `unverified`, but never `clear` with somebody there. With
-failed lidar or wheels it may also say that the room was not reached. A fault of a motion sensor changes no verdict.
+Every second or third patrol has one fault of the simulator (docs/scenarios.md) that begins while the robot drives or
+looks; most last for some seconds. A guard with a failed camera may say `unverified`, but never `clear` with somebody
+there. With failed lidar or wheels it may also say that the room was not reached. A fault of a motion sensor changes no
+verdict.
 """
 
 from __future__ import annotations
@@ -34,19 +35,20 @@ class Mishap:
     allowed: tuple[str, ...] = ()
 
 
-def mishap_of(seed: int, number: int, room: int, rooms: Sequence[int]) -> Mishap | None:
-    """Mishap of a patrol, None in every other one.
+def mishap_of(seed: int, number: int, room: int, rooms: Sequence[int], *, every: int = 2) -> Mishap | None:
+    """Mishap of a patrol, None if it has none.
 
     Args:
         seed: of the campaign.
         number: of the patrol.
         room: that is triggered.
         rooms: all but the base.
+        every: every how many patrols one has a fault.
     """
-    if (number + seed) % 2:
+    if (number + seed) % every:
         return None
-    rng = np.random.default_rng([seed, number // 2 // len(MISHAPS), 4])
-    make = MISHAPS[int(rng.permutation(len(MISHAPS))[number // 2 % len(MISHAPS)])]
+    rng = np.random.default_rng([seed, number // every // len(MISHAPS), 4])
+    make = MISHAPS[int(rng.permutation(len(MISHAPS))[number // every % len(MISHAPS)])]
     own = np.random.default_rng([seed, number, 3])
     others = [other for other in rooms if other != room] or [room]
     return make(own, room, int(own.choice(others)))

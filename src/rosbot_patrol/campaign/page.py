@@ -21,10 +21,7 @@ _WHEN = {
     "home": "trigger to home",
 }
 
-_PAGE = Template("""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>$title</title>
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<style>
+STYLE = """
 :root { color-scheme: light dark; --ink: #1d2430; --soft: #5d6675; --line: #d9dde4; --paper: #fff; --card: #f5f6f8;
   --well: #23715b; --wrong: #b3372b; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e6e9ee; --soft: #9aa4b2; --line: #343b46; --paper: #14181e;
@@ -49,7 +46,12 @@ svg .bar { opacity: 0.3; } svg .well { fill: var(--well); } svg .wrong { fill: v
 svg .plain { fill: var(--soft); } svg .mark { opacity: 0.55; } svg .value { fill: var(--soft); }
 svg .median { stroke: var(--ink); stroke-width: 2; }
 svg .bound { stroke: var(--wrong); stroke-width: 1.5; stroke-dasharray: 3 3; }
-</style></head><body>
+"""
+
+_PAGE = Template("""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>$title</title>
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<style>$style</style></head><body>
 <h1>$title</h1>
 <p class="soft">$subtitle</p>
 <div class="tiles">$tiles</div>
@@ -57,6 +59,7 @@ svg .bound { stroke: var(--wrong); stroke-width: 1.5; stroke-dasharray: 3 3; }
 <h2>Found, by kind of patrol</h2>$kinds
 <h2>How well [m]</h2>$places
 <h2>How soon, in simulated seconds</h2>$times
+<h2>What it costs to look</h2>$costs
 <h2>Not as they should be</h2>$failures
 <h2>Every patrol</h2><div class="wide"><table><thead><tr>$headings</tr></thead><tbody>$rows</tbody></table></div>
 <p class="soft">Bars are the intervals that hold the true share with 95 % (Wilson 1927), dots the shares; each small
@@ -76,6 +79,7 @@ def page(results: Sequence[Result], command: Callable[[Result], str], *, subtitl
     counted = shares(results)
     failed = [result for result in results if result.failures]
     return _PAGE.substitute(
+        style=STYLE,
         title=f"A campaign of {count_of(len(results), 'patrol')}",
         subtitle=escape(subtitle),
         tiles="".join(_tiles(results, counted)),
@@ -83,6 +87,7 @@ def page(results: Sequence[Result], command: Callable[[Result], str], *, subtitl
         kinds=_kinds(results),
         places=_places(results),
         times=_times(results),
+        costs=_costs(results),
         failures=_failures(failed, command),
         headings="".join(f"<th>{escape(name)}</th>" for name in HEADINGS),
         rows="".join(_row(result) for result in results),
@@ -139,6 +144,26 @@ def _times(results: Sequence[Result]) -> str:
 def _seconds(results: Sequence[Result], name: str) -> list[float]:
     """Times of that name, of the patrols that have one [s]."""
     return _known(results, lambda result: result.times.get(name))
+
+
+def _costs(results: Sequence[Result]) -> str:
+    """Way and time to the look, what the first viewpoint showed, how many there were, and what stayed unseen."""
+    looked = [result for result in results if result.viewpoints]
+    seconds_a_metre = [
+        result.times["arrived"] / result.way for result in results if result.way and "arrived" in result.times
+    ]
+    ways: list[tuple[str, list[float], float | None]] = [
+        ("way to the room [m]", _known(results, lambda r: r.way), None),
+        ("seconds a metre of it, to the look", seconds_a_metre, None),
+        ("viewpoints", [float(result.viewpoints) for result in looked], None),
+    ]
+    parts: list[tuple[str, list[float], float | None]] = [
+        ("floor seen from the first viewpoint", _known(looked, lambda r: r.share_first), None),
+        ("floor seen at the end", _known(looked, lambda r: r.share_true), None),
+        ("never seen: no place shows it", [r.unseen["hidden"] for r in looked if r.unseen], None),
+        ("never seen: passed over", [r.unseen["passed over"] for r in looked if r.unseen], None),
+    ]
+    return spread_chart(ways, "") + spread_chart(parts, "") or "<p>No patrol has looked at a room.</p>"
 
 
 _QUICK, _SLOW = ("goal", "seen_to_notice"), ("notice", "arrived", "looked", "home")

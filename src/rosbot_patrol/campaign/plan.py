@@ -1,7 +1,7 @@
 """Plan of each patrol in a campaign, drawn from a seed: house, room, people, expected outcome.
 
-Patrol k of seed s is the same whatever else is run: everything in it uses the seed (s, k). Each block of `len(KINDS)`
-patrols has every kind once, in its own order; the houses take turns.
+Patrol k of seed s is the same whatever else is run: everything in it uses the seed (s, k). Each block of ten patrols
+has every kind of its mix, in its own order; the houses take turns.
 
 Nobody is placed in a wall or on the robot's only path: by the world's own shapes there is room to stand at every place.
 A hidden person is out of sight from the room's point and, if the house allows it, from the route there. But some place
@@ -19,11 +19,14 @@ import yaml
 
 from rosbot_patrol.campaign.cast import CASTS, Cast, Person, Stage
 from rosbot_patrol.campaign.floor import Floor
-from rosbot_patrol.campaign.houses import HouseFiles
+from rosbot_patrol.campaign.houses.files import HouseFiles
 from rosbot_patrol.campaign.mishaps import mishap_of
 from rosbot_patrol.errors import WorldError
 
 KINDS = ("standing", "walking", "hidden", "late", "standing", "walking", "two", "pets", "poster", "empty")
+HALF_EMPTY = ("standing", "walking", "hidden", "late", "two", "pets", "poster", "empty", "empty", "empty")
+MIXES = {"usual": KINDS, "half_empty": HALF_EMPTY}
+LIGHTS = ("day", "day", "noon", "evening", "lamps", "torch")  # how often each is drawn
 INTRUDERS = frozenset({"standing", "walking", "hidden", "late", "two"})
 
 CLEAR, CONFIRMED = "clear", "confirmed"
@@ -77,10 +80,11 @@ def patrol_from_plain(tree: dict[str, Any]) -> Patrol:
     return Patrol(**{**tree, "people": people, "viewpoint": at, "allowed": tuple(tree.get("allowed", ()))})
 
 
-def kind_of(seed: int, number: int) -> str:
-    """Kind of a patrol."""
-    block, place = divmod(number, len(KINDS))
-    return KINDS[int(np.random.default_rng([seed, block, 1]).permutation(len(KINDS))[place])]
+def kind_of(seed: int, number: int, mix: str = "usual") -> str:
+    """Kind of a patrol; `mix` is one of MIXES."""
+    kinds = MIXES[mix]
+    block, place = divmod(number, len(kinds))
+    return kinds[int(np.random.default_rng([seed, block, 1]).permutation(len(kinds))[place])]
 
 
 def house_of(seed: int, number: int, houses: Sequence[str]) -> str:
@@ -88,7 +92,16 @@ def house_of(seed: int, number: int, houses: Sequence[str]) -> str:
     return houses[(number + number // len(KINDS) + seed) % len(houses)]
 
 
-def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor, *, faults: bool = False) -> Patrol:
+def plan_patrol(
+    seed: int,
+    number: int,
+    files: HouseFiles,
+    floor: Floor,
+    *,
+    faults: int = 0,
+    mix: str = "usual",
+    is_light_drawn: bool = False,
+) -> Patrol:
     """Plan a patrol.
 
     Args:
@@ -96,26 +109,42 @@ def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor, *, faul
         number: of the patrol.
         files: of the house that it is in.
         floor: of that house.
-        faults: whether every other patrol has a fault; the people stay the same.
+        faults: every how many patrols one has a fault, 0 for never; the people stay the same.
+        mix: of the kinds of patrols, one of MIXES.
+        is_light_drawn: whether the light is drawn, from noon to a torch.
 
     Raises:
-        WorldError: no room of the house has a place that suits the kind.
+        WorldError: no room of the house has a place that suits the kind, nor a plainer one.
     """
-    kind = kind_of(seed, number)
+    kind = kind_of(seed, number, mix)
     rng = np.random.default_rng([seed, number, 2])
     rooms = [room.id for room in floor.rooms if room.id != floor.rooms.base.id]
+    found = _cast(floor, kind, rooms, rng)
+    if found is None:  # in a strange house there may be nowhere to hide, or no wall for a poster
+        kind = "standing" if kind in INTRUDERS else "empty"
+        found = _cast(floor, kind, rooms, rng)
+    if found is None:
+        raise WorldError(files.name, f"has no room with a place for a patrol of the kind '{kind}'")
+    patrol = _patrol(seed, number, kind, files=files, floor=floor, room=found[0], cast=found[1])
+    if is_light_drawn:
+        light = str(np.random.default_rng([seed, number, 8]).choice(LIGHTS))
+        patrol = replace(patrol, scenario={**patrol.scenario, "light": light})
+    return _broken(patrol, rooms, faults) if faults else patrol
+
+
+def _cast(floor: Floor, kind: str, rooms: Sequence[int], rng: np.random.Generator) -> tuple[int, Cast] | None:
+    """A room and its cast; None if no room has a place for it."""
     for make in CASTS[kind] * PASSES:
         for room in rng.permutation(rooms):
             cast = make(Stage(floor, int(room), rng))
             if cast is not None:
-                patrol = _patrol(seed, number, kind, files=files, floor=floor, room=int(room), cast=cast)
-                return _broken(patrol, rooms) if faults else patrol
-    raise WorldError(files.name, f"has no room with a place for a patrol of the kind '{kind}'")
+                return int(room), cast
+    return None
 
 
-def _broken(patrol: Patrol, rooms: Sequence[int]) -> Patrol:
+def _broken(patrol: Patrol, rooms: Sequence[int], every: int) -> Patrol:
     """A patrol with its mishap, if it has one."""
-    mishap = mishap_of(patrol.seed, patrol.number, patrol.room, rooms)
+    mishap = mishap_of(patrol.seed, patrol.number, patrol.room, rooms, every=every)
     if mishap is None:
         return patrol
     expect = {key: value for key, value in patrol.scenario["expect"].items() if key != "verdicts"}
@@ -134,10 +163,7 @@ def _patrol(seed: int, number: int, kind: str, *, files: HouseFiles, floor: Floo
     expected = CONFIRMED if kind in INTRUDERS else CLEAR
     tree: dict[str, Any] = {
         "title": f"{cast.title} in the {known.name} ({files.name})",
-        "world": str(files.world),
-        "motion_sensors": str(files.sensors),
-        "map": str(files.map),
-        "room_points": str(files.rooms),
+        **files.entries(),
         "seed": seed * 1000 + number,
         "actors": [dict(actor) for actor in cast.actors],
         "triggers": [{"sensor": room, "at": TRIGGER_AT}],

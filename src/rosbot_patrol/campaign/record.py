@@ -28,6 +28,9 @@ class Result:
         in_room, in_view: durations [s]; views: number of images that could show somebody.
         place_error: distance of the notified position from the true one [m].
         share_told, share_true: of the room's floor that was seen.
+        share_first: of it told at the end of the first viewpoint; viewpoints: number of them.
+        unseen: shares of the floor that were not seen, by the reason.
+        way: length of the robot's shortest path to the room's point [m].
         times: seconds of simulated time between two events, by name.
         contacts: objects that the robot touched; touches: each touch in words, with its time and who moved.
         localisation: mean and largest error of the pose [m].
@@ -35,7 +38,7 @@ class Result:
         home: whether it came back; None if it went on to another room, or unknown.
         suspects: objects that the guard reports as person-like.
         mishap: the fault, "" for none; allowed: verdicts that it excuses.
-        people: persons to be found; mails: delivered mails about incidents; missions: number that ended.
+        people: persons to be found; mails: delivered mails of the mission to the room; missions: number that ended.
         sim_s, wall_s: duration.
     """
 
@@ -55,6 +58,10 @@ class Result:
     place_error: float | None = None
     share_told: float | None = None
     share_true: float | None = None
+    share_first: float | None = None
+    viewpoints: int = 0
+    unseen: dict[str, float] = field(default_factory=dict)
+    way: float | None = None
     times: dict[str, float] = field(default_factory=dict)
     contacts: list[str] = field(default_factory=list)
     touches: list[str] = field(default_factory=list)
@@ -133,19 +140,44 @@ def result_from_plain(tree: Mapping[str, Any]) -> Result:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Settings of a folder's campaign; another campaign needs another folder."""
+    """Settings of a folder's campaign; another campaign needs another folder.
+
+    Attributes:
+        faults: every how many patrols something breaks, 0 for never.
+        generated: number of drawn houses; world: file of a strange world. Without either, our own houses.
+    """
 
     seed: int
     houses: tuple[str, ...]
     kind: str = "patrols"
-    faults: bool = False
+    faults: int = 0
     network: str = "house"
     figures: str = "plain"
     hardware: bool = False
+    generated: int = 0
+    world: str = ""
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it plays in our own houses."""
+        return not self.generated and not self.world
+
+    @property
+    def mix(self) -> str:
+        """Mix of the kinds of patrols, of `plan.MIXES`."""
+        return "usual" if self.is_own else "half_empty"
 
 
-_LATER: dict[str, Any] = {"faults": False, "network": "house", "figures": "plain", "hardware": False}
+_LATER: dict[str, Any] = {
+    "faults": 0,
+    "network": "house",
+    "figures": "plain",
+    "hardware": False,
+    "generated": 0,
+    "world": "",
+}
 """Settings that folders of earlier campaigns lack, as those ran."""
+_EVERY_OTHER = 2  # folders of earlier campaigns say True
 
 
 class CampaignFolder:
@@ -165,6 +197,8 @@ class CampaignFolder:
         self.settings = settings
         path = folder / SETTINGS
         begun = _read(path)
+        if begun is not None and begun.get("faults") is True:
+            begun["faults"] = _EVERY_OTHER
         now = json.loads(json.dumps(asdict(settings)))
         if begun is None:
             write_json(path, now)
@@ -178,18 +212,41 @@ class CampaignFolder:
 
     def result(self, number: int) -> Result | None:
         """Result of a patrol, None if it has not been run."""
-        tree = _read(self.of(number) / RESULT)
-        if tree is None:
-            return None
-        try:
-            return result_from_plain(tree)
-        except TypeError as err:
-            raise ParamError(str(self.of(number) / RESULT), f"is no result ({err}): remove it") from err
+        return _result(self.of(number) / RESULT)
 
     def results(self) -> list[Result]:
         """Results of all patrols run so far, in order."""
-        numbers = sorted(int(path.parent.name) for path in self.folder.glob(f"[0-9]*/{RESULT}"))
-        return [result for number in numbers if (result := self.result(number)) is not None]
+        return _results(self.folder)
+
+
+def results_in(folder: Path) -> list[Result]:
+    """Results in the folder of any campaign.
+
+    Raises:
+        ParamError: it holds none.
+    """
+    settings = _read(folder / SETTINGS)
+    if settings is None:
+        raise ParamError(str(folder), f"holds no campaign (there is no {SETTINGS})")
+    found = _results(folder)
+    if not found:
+        raise ParamError(str(folder), "holds a campaign without any result")
+    return found
+
+
+def _results(folder: Path) -> list[Result]:
+    paths = sorted(folder.glob(f"[0-9]*/{RESULT}"), key=lambda path: int(path.parent.name))
+    return [result for path in paths if (result := _result(path)) is not None]
+
+
+def _result(path: Path) -> Result | None:
+    tree = _read(path)
+    if tree is None:
+        return None
+    try:
+        return result_from_plain(tree)
+    except TypeError as err:
+        raise ParamError(str(path), f"is no result ({err}): remove it") from err
 
 
 def _read(path: Path) -> dict[str, Any] | None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.campaign.intervals import wilson
-from rosbot_patrol.campaign.plan import CONFIRMED
+from rosbot_patrol.campaign.plan import CLEAR, CONFIRMED
 from rosbot_patrol.campaign.record import Result
 
 UNKNOWN = "-"
@@ -179,6 +180,13 @@ def figures(results: Sequence[Result]) -> dict[str, float]:
         "home_rate": home.hits / home.trials if home.trials else 0.0,
         "patrols": float(len(results)),
     }
+    errors = [r.place_error for r in results if r.place_error is not None]
+    if errors:
+        named["place_median"] = statistics.median(errors)
+        named["place_95"] = sorted(errors)[math.ceil(0.95 * len(errors)) - 1]
+    named["clear_with_somebody"] = float(sum(r.was_there and r.verdict == CLEAR for r in results))
+    mailed = [r.has_its_mails for r in results if r.verdict == CONFIRMED and not r.problem]
+    named["one_mail_rate"] = sum(mailed) / len(mailed) if mailed else 0.0
     for share in survived:
         named["survived_rate"] = share.hits / share.trials
     if times := [r.times["notice"] for r in results if "notice" in r.times]:

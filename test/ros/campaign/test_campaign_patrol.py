@@ -13,7 +13,7 @@ import rospy
 from rosbot_patrol.msg import Alert, PatrolState
 
 from rosbot_patrol.campaign.cast import Person
-from rosbot_patrol.campaign.houses import load_house
+from rosbot_patrol.campaign.houses.files import house_files, load_house
 from rosbot_patrol.campaign.plan import Patrol
 from rosbot_patrol.campaign.record import Result
 from rosbot_patrol.geometry import Pose2D
@@ -21,12 +21,13 @@ from rosbot_patrol.ros.campaign.evaluation import Run, evaluate
 from rosbot_patrol.ros.campaign.watch import Recording, State
 
 ROOT = Path(__file__).parents[3]
+FLAT = house_files("flat", ROOT)
 POINT, PLACE = (3.10, 3.15), (4.3, 3.15)
 
 
 @pytest.fixture(scope="module")
 def patrol() -> Patrol:
-    assert load_house("flat", ROOT).rooms.find(1) is not None
+    assert load_house(FLAT).rooms.find(1) is not None
     return Patrol(
         number=4, seed=1, kind="standing", house="flat", room=1, room_name="living room", expected="confirmed",
         scenario={"title": "somebody"}, people=(Person(name="bob"),),
@@ -62,8 +63,8 @@ def recording(*, seen_at: float | None, verdict: str, after: str = "") -> Record
 
 
 def judged(patrol: Patrol, heard: Recording, folder: Path, **changes: Any) -> Result:
-    given: dict[str, Any] = {"problem": "", "mails": 1, "contacts": [], "wall_s": 60.0}
-    return evaluate(patrol, heard, ROOT, folder, Run(**{**given, **changes}))
+    given: dict[str, Any] = {"problem": "", "mails": ["m1"], "contacts": [], "wall_s": 60.0}
+    return evaluate(patrol, heard, FLAT, folder, Run(**{**given, **changes}))
 
 
 def test_who_was_found_was_found_in_time(patrol: Patrol, tmp_path: Path) -> None:
@@ -80,8 +81,14 @@ def test_who_was_found_was_found_in_time(patrol: Patrol, tmp_path: Path) -> None
     assert result.home
 
 
+def test_mails_of_a_later_mission_are_not_this_one_s(patrol: Patrol, tmp_path: Path) -> None:
+    heard = recording(seen_at=24.0, verdict="confirmed")
+    assert judged(patrol, heard, tmp_path, mails=["m1", "m1.2", "other"]).mails == 2
+    assert judged(patrol, heard, tmp_path, mails=["other"]).failures == ("0 mails",)
+
+
 def test_who_was_in_view_and_not_found_was_missed(patrol: Patrol, tmp_path: Path) -> None:
-    result = judged(patrol, recording(seen_at=None, verdict="clear"), tmp_path, mails=0)
+    result = judged(patrol, recording(seen_at=None, verdict="clear"), tmp_path, mails=[])
     assert result.failures == ("missed",)
     assert result.in_view == pytest.approx(1.6, abs=0.5)
 
@@ -93,7 +100,7 @@ def test_whose_robot_goes_on_to_another_room_does_not_have_to_be_home(patrol: Pa
 
 
 def test_a_house_that_never_came_up_is_a_problem_and_nothing_else(patrol: Patrol, tmp_path: Path) -> None:
-    result = judged(patrol, Recording(), tmp_path, problem="roslaunch ended", mails=0)
+    result = judged(patrol, Recording(), tmp_path, problem="roslaunch ended", mails=[])
     assert result.failures == ("roslaunch ended",)
     assert result.verdict == ""
     assert result.share_true is None

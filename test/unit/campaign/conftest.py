@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from rosbot_patrol.campaign.floor import Floor
-from rosbot_patrol.campaign.houses import House, load_house
+from rosbot_patrol.campaign.houses.files import House, house_files, load_house
 
 ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="session")
 def flat() -> House:
-    return load_house("flat", ROOT)
+    return load_house(house_files("flat", ROOT))
 
 
 @pytest.fixture(scope="session")

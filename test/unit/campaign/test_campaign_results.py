@@ -91,8 +91,13 @@ def test_patrols_in_which_something_broke_are_counted_by_themselves() -> None:
 def test_a_folder_from_before_there_were_faults_goes_on(tmp_path: Path) -> None:
     (tmp_path / "campaign.json").write_text('{"seed": 1, "houses": ["flat"], "kind": "patrols"}')
     CampaignFolder(tmp_path, Settings(seed=1, houses=("flat",)))
-    with pytest.raises(ParamError, match="faults False, not True"):
-        CampaignFolder(tmp_path, Settings(seed=1, houses=("flat",), faults=True))
+    with pytest.raises(ParamError, match="faults 0, not 2"):
+        CampaignFolder(tmp_path, Settings(seed=1, houses=("flat",), faults=2))
+
+
+def test_a_folder_in_which_every_other_patrol_had_a_fault_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "campaign.json").write_text('{"seed": 1, "houses": ["flat"], "kind": "patrols", "faults": true}')
+    CampaignFolder(tmp_path, Settings(seed=1, houses=("flat",), faults=2))
 
 
 def test_a_result_outlives_the_file_and_a_newer_version() -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.raster import grown
 from rosbot_patrol.maps.zones import Zone, zones_mask
 
 Mask = NDArray[np.bool_]
@@ -109,12 +110,12 @@ class Floor:
         hit = np.zeros(self.info.shape, bool)
         ix, iy, inside = self.indices(points[:, 0], points[:, 1])
         hit[iy[inside], ix[inside]] = True
-        return _grown(hit, math.ceil(radius / self.info.resolution - 0.5))
+        return grown(hit, math.ceil(radius / self.info.resolution - 0.5))
 
     def open_to(self, mask: Mask, radius: float) -> Mask:
         """Part of a mask that discs of a radius [m] fit into, without specks and slits."""
         cells = max(round(radius / self.info.resolution), 0)
-        return mask & _grown(~_grown(~mask, cells), cells)
+        return mask & grown(~grown(~mask, cells), cells)
 
 
 def floor_of(grid: Grid, *, free_below: int = 25, zones: Sequence[Zone] = ()) -> Floor:
@@ -189,17 +190,4 @@ def _run_lengths(free: Mask) -> NDArray[np.int64]:
     for row, is_free in enumerate(free):
         count = (count + 1) * is_free
         out[row] = count
-    return out
-
-
-def _grown(mask: Mask, cells: int) -> Mask:
-    """A mask grown by this many cells."""
-    out = mask.copy()
-    for dy in range(-cells, cells + 1):
-        for dx in range(-cells, cells + 1):
-            if dx * dx + dy * dy > cells * cells:
-                continue
-            to = (slice(max(dy, 0), mask.shape[0] + min(dy, 0)), slice(max(dx, 0), mask.shape[1] + min(dx, 0)))
-            of = (slice(max(-dy, 0), mask.shape[0] + min(-dy, 0)), slice(max(-dx, 0), mask.shape[1] + min(-dx, 0)))
-            out[to] |= mask[of]
     return out

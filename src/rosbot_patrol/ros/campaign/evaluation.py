@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import dropwhile
 from pathlib import Path
 
+import numpy as np
+
 from rosbot_patrol.alerts.records.incident import Incident
 from rosbot_patrol.alerts.records.store import IncidentStore, has_incidents
 from rosbot_patrol.campaign.floor import Floor
-from rosbot_patrol.campaign.houses import load_house
+from rosbot_patrol.campaign.houses.files import HouseFiles, load_house
 from rosbot_patrol.campaign.plan import CONFIRMED, Patrol
 from rosbot_patrol.campaign.record import Result
-from rosbot_patrol.campaign.share import true_share
+from rosbot_patrol.campaign.share import seen_floor, unseen_shares
 from rosbot_patrol.campaign.truth import Presence, Track, place_error, presence, touches
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.msg import Alert, PatrolState
+from rosbot_patrol.patrol.visibility.coverage import Coverage
 from rosbot_patrol.ros.campaign.watch import Recording, State
+from rosbot_patrol.ros.models.packages import read_world
 
+_ON_THE_WAY = "going to a further viewpoint"
 HOME = 0.35  # largest distance from the start at which the robot counts as home [m]
 
 Times = dict[str, float]
@@ -34,13 +39,13 @@ class Run:
 
     Attributes:
         problem: reason why the house did not run to the end, "" if it did.
-        mails: number of mails about incidents.
+        mails: incident of each mail, by its id.
         contacts: names of the things that the robot touched, without the floor.
         wall_s: duration in real time [s].
     """
 
     problem: str
-    mails: int
+    mails: Sequence[str]
     contacts: list[str]
     wall_s: float
 
@@ -86,6 +91,21 @@ class Mission:
         return largest if largest >= 0.0 else None
 
     @property
+    def viewpoints(self) -> list[float]:
+        """Share of the floor that the guard reports at the end of each viewpoint."""
+        shares: list[float] = []
+        was_looking = False
+        for state in self.states:
+            message = state.message
+            is_looking = message.state == PatrolState.LOOKING and not message.why.startswith(_ON_THE_WAY)
+            if is_looking and not was_looking:
+                shares.append(0.0)
+            if shares and message.share_seen >= 0.0:
+                shares[-1] = float(message.share_seen)
+            was_looking = is_looking
+        return shares
+
+    @property
     def decided(self) -> float | None:
         """Time of the verdict: the first notice, else the end of the look-around [s]."""
         moments = self._moments()
@@ -115,13 +135,13 @@ class Mission:
         return _first(t for t, alert in self._heard.alerts if alert.id.startswith(self.id) and alert.kind == kind)
 
 
-def evaluate(patrol: Patrol, heard: Recording, root: Path, state_dir: Path, run: Run) -> Result:
+def evaluate(patrol: Patrol, heard: Recording, files: HouseFiles, state_dir: Path, run: Run) -> Result:
     """Compare a recording, and the guard's own record, with ground truth.
 
     Args:
         patrol: the plan.
         heard: the recording.
-        root: folder of the package.
+        files: of the house.
         state_dir: folder of the guard's state.
         run: facts about the programs.
     """
@@ -130,11 +150,14 @@ def evaluate(patrol: Patrol, heard: Recording, root: Path, state_dir: Path, run:
     times = mission.times()
     robot, tracks = heard.robot_track(), heard.actor_tracks()
     last = mission.decided if mission.decided is not None else _last(robot)
-    house = load_house(patrol.house, root)
+    house = load_house(files, read_world)
     floor = Floor(house.bodies, house.rooms)
     there = presence(floor, patrol.room, patrol.people, tracks, robot, begin=mission.triggered, end=last)
     times |= _from_view(there, heard)
     kept = _kept(state_dir, mission.id)
+    seen = _seen(floor, patrol.room, robot, mission)
+    viewpoints = mission.viewpoints
+    drive = floor.drive_to(patrol.room)
     home = math.dist(robot.poses[-1][:2], robot.poses[0][:2]) if robot.times else None
     return Result(
         number=patrol.number,
@@ -152,7 +175,11 @@ def evaluate(patrol: Patrol, heard: Recording, root: Path, state_dir: Path, run:
         in_view=there.in_view,
         place_error=_place_error(kept, patrol, tracks, last),
         share_told=kept.share_seen if kept is not None else mission.share_told,
-        share_true=_share_true(floor, patrol.room, robot, mission),
+        share_true=seen.share if seen is not None else None,
+        share_first=viewpoints[0] if viewpoints else None,
+        viewpoints=len(viewpoints),
+        unseen=unseen_shares(floor, patrol.room, seen) if seen is not None else {},
+        way=float(np.hypot(*np.diff(drive, axis=0).T).sum()) if len(drive) else None,
         times={name: round(value, 2) for name, value in times.items()},
         contacts=run.contacts,
         touches=touches(heard.contacts, robot, tracks),
@@ -163,7 +190,7 @@ def evaluate(patrol: Patrol, heard: Recording, root: Path, state_dir: Path, run:
         mishap=patrol.mishap,
         allowed=patrol.allowed,
         people=len(patrol.people),
-        mails=run.mails,
+        mails=sum(mission.id is not None and mail.startswith(mission.id) for mail in run.mails),
         missions=len({s.message.mission for s in heard.states if s.message.mission}),
         sim_s=round(_last(robot), 1),
         wall_s=round(run.wall_s, 1),
@@ -184,10 +211,10 @@ def _place_error(kept: Incident | None, patrol: Patrol, tracks: dict[str, Track]
     return place_error(tracks, patrol.people, time, *kept.person)
 
 
-def _share_true(floor: Floor, room: int, robot: Track, mission: Mission) -> float | None:
-    """Share of the floor that the camera really saw from the trigger to the end of the look-around."""
+def _seen(floor: Floor, room: int, robot: Track, mission: Mission) -> Coverage | None:
+    """Floor that the camera really saw from the trigger to the end of the look-around."""
     looked = mission.times().get("looked")
-    return true_share(floor, room, robot, mission.triggered, mission.triggered + looked) if looked else None
+    return seen_floor(floor, room, robot, mission.triggered, mission.triggered + looked) if looked else None
 
 
 def _from_view(there: Presence, heard: Recording) -> Times:

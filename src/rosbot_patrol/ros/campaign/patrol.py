@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.campaign.crash_ledger import KeptMail
+from rosbot_patrol.campaign.houses.files import HOUSES, scenario_files
 from rosbot_patrol.campaign.plan import CONFIRMED, WITHIN, Patrol, patrol_from_plain, scenario_text
 from rosbot_patrol.campaign.record import PLAN, RESULT, Result
 from rosbot_patrol.files import write_atomic
@@ -17,6 +18,7 @@ from rosbot_patrol.ros.campaign.evaluation import Mission, Run, evaluate
 from rosbot_patrol.ros.campaign.house import House, HouseError, Master
 from rosbot_patrol.ros.campaign.mail_sink import kept_mails
 from rosbot_patrol.ros.campaign.watch import CampaignWatch
+from rosbot_patrol.simulation.scenario.file import read_scenario
 
 READY = 120.0  # longest wait for the house to be on guard [s]
 MAIL = 20.0  # longest wait for a mail after the mission [s]
@@ -48,6 +50,8 @@ def play(folder: Path, root: Path, limit: float, eyes: Eyes) -> Result:
         eyes: network and figures.
     """
     patrol = patrol_from_plain(json.loads((folder / PLAN).read_text(encoding="utf-8")))
+    files = scenario_files(patrol.house, patrol.scenario, folder, root)
+    patrol = replace(patrol, scenario={**patrol.scenario, **files.entries()})
     file = folder / "scenario.yaml"
     write_atomic(file, scenario_text(patrol).encode())
     began = time.monotonic()
@@ -59,13 +63,19 @@ def play(folder: Path, root: Path, limit: float, eyes: Eyes) -> Result:
         "watched": "true",
         "rate": 0,
         "teleop": "false",
-        "house": patrol.house,
+        "console": "false",  # nobody looks
+        "house": patrol.house if patrol.house in HOUSES else HOUSES[0],
         "network": eyes.network,
         "figures": eyes.figures,
     }
+    scenario = read_scenario(file)
+    arguments |= scenario.launch_arguments
+    if scenario.robot is not None:
+        start = scenario.robot
+        arguments |= {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
     if eyes.is_hardware:  # devices on wires have a clock of their own
         arguments |= {"simulation": "hardware", "rate": 1, "hardware_folder": folder / "devices"}
-    house = House(folder, "rosbot_patrol", "scenario.launch", seed=patrol.scenario["seed"], **arguments)
+    house = House(folder, "rosbot_patrol", "scenario.launch", **arguments)
     problem = ""
     try:
         house.start()
@@ -74,13 +84,13 @@ def play(folder: Path, root: Path, limit: float, eyes: Eyes) -> Result:
     except HouseError as err:
         problem = str(err).splitlines()[0]
     finally:
-        mails = len(_notices(house))
+        mails = [notice.incident for notice in _notices(house)]
         contacts = [other for kind, other in house.contacts if kind != "floor"]
         house.stop()
         watch.stop()
         master.stop()
     run = Run(problem=problem, mails=mails, contacts=contacts, wall_s=time.monotonic() - began)
-    result = evaluate(patrol, watch.heard, root, folder / "state", run)
+    result = evaluate(patrol, watch.heard, files, folder / "state", run)
     write_atomic(folder / RESULT, result.to_json().encode())
     return result
 

@@ -1,0 +1,1 @@
+"""Houses of a campaign: our own, drawn ones, and strange worlds."""
