@@ -37,10 +37,16 @@ PATIENCE_S = 120.0  # time limit for the node's start, and for one scan
 
 @dataclass(frozen=True)
 class Run:
-    """Result of a log through a node: poses, shape (N, 3), seconds of a core, peak memory [MB]."""
+    """Result of a log through a node.
+
+    Attributes:
+        poses: the robot's at each scan, shape (N, 3).
+        ms: processor time that the node took for a scan, mean, without the time in which it waited.
+        mb: peak memory.
+    """
 
     poses: Poses
-    cpu_s: float
+    ms: float
     mb: float
 
 
@@ -78,25 +84,31 @@ class Feeder:
                 t, q = each.transform.translation, each.transform.rotation
                 self.correction = Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
 
-    def send(self, scan: LaserScan, odometry: Pose2D, stamp: float, pid: int) -> None:
-        """Send one scan, and wait until the node has processed it and sent its transform."""
+    def send(self, scan: LaserScan, odometry: Pose2D, stamp: float, pid: int) -> int:
+        """Send one scan, and wait until the node has processed it and sent its transform.
+
+        Returns:
+            Processor time that the scan took [ns].
+        """
+        began = cpu_ns(pid)
         self._clock.publish(time_to_msg(stamp))
         self._tf.publish([transform_to_msg(odometry, "odom", "base_link", stamp)])
         self._scan.publish(scan_to_msg(replace(scan, stamp=stamp, frame_id=self._frame)))
-        until_done(pid)
+        ended = until_done(pid)
         for k in range(STEPS):
             self._clock.publish(time_to_msg(stamp + (k + 1) * STEP_S))
             until_done(pid)
+        return ended - began
 
 
-def until_done(pid: int) -> None:
-    """Wait until a node is idle."""
+def until_done(pid: int) -> int:
+    """Wait until a node is idle; returns its processor time when it became so [ns]."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         before = cpu_ns(pid)
         time.sleep(QUIET_S)
         if cpu_ns(pid) - before < BUSY_NS:
-            return
+            return before
     raise SystemExit(f"process {pid} is not done with a scan after {PATIENCE_S:.0f} s")
 
 
@@ -115,12 +127,12 @@ def through_node(command: list[str], log: CarmenLog, odometry: Poses, params: di
                     raise SystemExit(f"{' '.join(command)}: {out.read()[-500:].decode(errors='replace')}")
                 time.sleep(0.1)
             until_done(node.pid)
-            began, rows, stamp, first = cpu_ns(node.pid), [], 0.0, log.scans[0].stamp
+            taken, rows, stamp, first = 0, [], 0.0, log.scans[0].stamp
             for scan, row in zip(log.scans, odometry, strict=True):
                 stamp = max(stamp + STEP_S * (STEPS + 1), EPOCH + scan.stamp - first)
-                feeder.send(scan, Pose2D(*row), stamp, node.pid)
+                taken += feeder.send(scan, Pose2D(*row), stamp, node.pid)
                 rows.append(compose(feeder.correction, Pose2D(*row)))
-            return Run(np.array(rows), 1e-9 * (cpu_ns(node.pid) - began), megabytes(node.pid, "VmHWM"))
+            return Run(np.array(rows), 1e-6 * taken / len(rows), megabytes(node.pid, "VmHWM"))
         finally:
             feeder.close()
             end_group(node)

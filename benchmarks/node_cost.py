@@ -51,6 +51,24 @@ def megabytes(pid: int, key: str) -> float:
     raise OSError(f"/proc/{pid}/status has no {key}")
 
 
+def require_idle(most: float = 0.15, seconds: float = 3.0) -> None:
+    """End the program with a sentence if other programs use more than a share of the processors."""
+    before = _ticks()
+    time.sleep(seconds)
+    busy, total = (after - earlier for after, earlier in zip(_ticks(), before, strict=True))
+    if busy > most * total:
+        raise SystemExit(
+            f"{100.0 * busy / total:.0f} % of the processors are in use, {100.0 * most:.0f} % at most are expected:"
+            " nothing is compared on a busy machine"
+        )
+
+
+def _ticks() -> tuple[int, int]:
+    """Clock ticks of all processors since the start: busy ones, and all."""
+    fields = [int(word) for word in Path("/proc/stat").read_text(encoding="ascii").split("\n", 1)[0].split()[1:9]]
+    return sum(fields) - fields[3] - fields[4], sum(fields)
+
+
 def original(package: str, name: str = "") -> str:
     """Path of a package's node (default: of its name) if it is the original, "" if it is ours."""
     found = subprocess.run(["catkin_find", "--libexec", package], capture_output=True, text=True, check=False)

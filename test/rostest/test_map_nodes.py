@@ -34,6 +34,20 @@ def test_a_map_goes_round_byte_for_byte(ros, first, tmp_path):
     assert yaml == (tmp_path / "first.yaml").read_text().replace("first", "again")
 
 
+def test_map_saver_crops(ros, tmp_path):
+    cells = np.full(INFO.shape, -1, dtype=np.int8)
+    cells[8:12, 10:20] = 0
+    write_map(str(tmp_path / "wide"), Grid(INFO, cells))
+    ros.node("map_server", str(tmp_path / "wide.yaml")).says("Read a", 20.0)
+    saver = ros.node("map_saver", "--crop", "0.1", "-f", str(tmp_path / "cropped"))
+    saver.says("Its known part has 14 X 8 cells", 20.0)
+    assert exit_code(saver) == 0
+    assert "origin: [-0.600000, -1.700000, 0.000000]" in (tmp_path / "cropped.yaml").read_text()
+    saver = ros.node("map_saver", "--crop", "-1")
+    saver.says("is -1.0, expected the margin in metres, 0 or more", 20.0)
+    assert exit_code(saver) == 1
+
+
 def test_map_saver_waits_on_the_topic_it_is_given(ros, first, tmp_path):
     saver = ros.node("map_saver", "-f", str(tmp_path / "late"), "map:=/other/map")
     saver.says("Waiting for the map on /other/map", 20.0)

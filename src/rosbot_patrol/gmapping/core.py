@@ -22,6 +22,7 @@ from rosbot_patrol.tf.frames import Frames
 log = logging.getLogger(__name__)
 
 _WAITING = 50  # scans: more than a fast lidar sends before an unplaceable scan is dropped and reported
+_STRANGE = 0.6  # share of the first scan's beams on walls of a saved map, below which it is probably of another place
 _REPEAT = 10.0  # between two warnings about updates [s]
 
 
@@ -62,6 +63,7 @@ class GmappingCore:
         self.feed = ScanFeed(frames, params.odom_frame, params.base_frame, lost="nothing is mapped", size=_WAITING)
         self.correction = Pose2D()
         self.problem = ""
+        self._misfit = ""  # why the saved map is probably wrong
         self._params = params
         self._heard = 0
         self._map_stamp = -math.inf  # stamp of the scan after which the last map was made
@@ -78,6 +80,11 @@ class GmappingCore:
         outcome = slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
         if slam.map_from_odom is not None:
             self.correction = slam.map_from_odom
+        if self._params.map_file and outcome.updated and len(slam.stamps) == 1 and outcome.fit < _STRANGE:
+            self._misfit = (
+                f"{100.0 * outcome.fit:.0f} % of the first scan lies on walls of {self._params.map_file}: is it a map"
+                " of this place, and initial_pose_x, _y and _a where the robot is on it?"
+            )
         self._note_problem(outcome, placed.scan)
         since = stamp - self._map_stamp
         if not outcome.updated or 0.0 <= since <= self._params.map_update_interval:
@@ -92,6 +99,8 @@ class GmappingCore:
         elif outcome.failed:
             count = self._params.particles
             text = f"scan matching failed for {outcome.failed} of {count} particles: they follow the odometry"
+        elif self._misfit:
+            text = self._misfit
         elif not outcome.updated:
             return
         else:

@@ -1,6 +1,6 @@
 """Inner loops of scan matching: search from the odometry's guess, Gauss-Newton refinement, and covariance.
 
-The objective is the sum over the beams of exp(-d2 / sigma), plus the odometry's Gaussian as a prior. Here d is the
+The objective is the sum over the beams of exp(-d2 / sigma), times a gain, plus the odometry's prior. Here d is the
 distance of a beam's end to the mean of the nearest wall cell within a few cells. This is the score of Grisetti,
 Stachniss, Burgard 2007 as gmapping implements it: the cell before the end, seen from the sensor, must be no wall. The
 refinement measures the distance across the wall if the wall forms a line, so that a corridor constrains a scan only
@@ -14,6 +14,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.gmapping.cholesky_kernels import factorise, solve, solve_upper
+from rosbot_patrol.gmapping.prior_kernels import add_prior, fill_prior, prior_cost
 from rosbot_patrol.gmapping.tile_kernels import BITS, FULL, MASK, MEAN_X, MEAN_Y, walls_from
 from rosbot_patrol.kernels import kernel
 
@@ -29,7 +31,9 @@ FIRST_BEAMS = 120  # approximate number of beams at the start of a refinement
 NEAR, NEAR_TURN = 0.05, 5e-4  # steps of a refinement [cells, rad] below which all beams are used
 DONE, DONE_TURN = 0.01, 1e-4  # steps at which it ends
 WIDEST = 1.0  # largest variance of the beams' distances from the walls [cells2]
-LOSS = 0.8  # a refinement with less than this share of the previous score is rejected
+LOSS = 3.0  # a refinement that makes the pose less likely by more than this, as a logarithm, is rejected ...
+WELL = 0.93  # ... unless this share of the beams fits after it
+FINER = 0.125  # steps of the search that goes on instead, as shares of the first ones
 
 
 @kernel()
@@ -125,21 +129,14 @@ def fit_of(
 
 
 @kernel()
-def prior_cost(dx: float, dy: float, turn: float, prior: Array) -> float:
-    """Half the squared Mahalanobis distance from the odometry's guess; `prior` is its information, shape (3, 3)."""
-    squared: float = (
-        prior[0, 0] * dx * dx + 2.0 * prior[0, 1] * dx * dy + prior[1, 1] * dy * dy + prior[2, 2] * turn * turn
-    )
-    return 0.5 * squared
-
-
-@kernel()
 def climb(
     table: Table,
     cells: Cells,
     pose: Array,
+    guess: Array,
     beams: Array,
     prior: Array,
+    rare: float,
     lstep: float,
     astep: float,
     halvings: int,
@@ -153,9 +150,11 @@ def climb(
     Args:
         table: of the map.
         cells: of all maps.
-        pose: x, y [cells], yaw; the odometry's guess before, shape (3,).
+        pose: initial x, y [cells], yaw, shape (3,).
+        guess: the odometry's, shape (3,).
         beams: see `match_particles`.
-        prior: information of the guess, shape (3, 3).
+        prior: see `prior_kernels`.
+        rare: likewise.
         lstep: first step [cells].
         astep: first turn [rad].
         halvings: how often the steps are halved.
@@ -164,24 +163,18 @@ def climb(
         sigma: of `score_of`.
         gain: weight of a beam's score against the prior.
     """
-    x0, y0, yaw0 = pose[0], pose[1], pose[2]
-    best = gain * every * score_of(table, cells, x0, y0, yaw0, beams, every, reach, sigma)
-    level = 0
+    best = gain * every * score_of(table, cells, pose[0], pose[1], pose[2], beams, every, reach, sigma)
+    best -= prior_cost(pose, guess, prior, rare)
+    tried, level = np.empty(3), 0
     for _ in range(MOST_MOVES):
         bx, by, byaw, found = pose[0], pose[1], pose[2], False
         for move in range(6):
-            x, y, yaw = pose[0], pose[1], pose[2]
-            step = 1.0 if move % 2 == 0 else -1.0
-            if move < 2:
-                x += step * lstep
-            elif move < 4:
-                y += step * lstep
-            else:
-                yaw += step * astep
-            value = gain * every * score_of(table, cells, x, y, yaw, beams, every, reach, sigma)
-            value -= prior_cost(x - x0, y - y0, yaw - yaw0, prior)
+            tried[:] = pose
+            tried[move // 2] += (astep if move >= 4 else lstep) * (1.0 if move % 2 == 0 else -1.0)
+            value = gain * every * score_of(table, cells, tried[0], tried[1], tried[2], beams, every, reach, sigma)
+            value -= prior_cost(tried, guess, prior, rare)
             if value > best:
-                best, bx, by, byaw, found = value, x, y, yaw, True
+                best, bx, by, byaw, found = value, tried[0], tried[1], tried[2], True
         pose[0], pose[1], pose[2] = bx, by, byaw
         if found:
             continue
@@ -190,37 +183,6 @@ def climb(
             return
         lstep *= 0.5
         astep *= 0.5
-
-
-@kernel()
-def factorise(a: Array, lower: Array) -> None:
-    """Cholesky: a = lower @ lower.T, shapes (3, 3); `a` is positive definite."""
-    lower[:] = 0.0
-    for i in range(3):
-        for j in range(i + 1):
-            total = a[i, j]
-            for k in range(j):
-                total -= lower[i, k] * lower[j, k]
-            lower[i, j] = math.sqrt(max(total, 1e-12)) if i == j else total / lower[j, j]
-
-
-@kernel()
-def solve_upper(lower: Array, v: Array) -> None:
-    """Solve lower.T @ x = v in place, v of shape (3,)."""
-    for i in range(2, -1, -1):
-        for k in range(i + 1, 3):
-            v[i] -= lower[k, i] * v[k]
-        v[i] /= lower[i, i]
-
-
-@kernel()
-def solve(lower: Array, v: Array) -> None:
-    """Solve lower @ lower.T @ x = v in place, v of shape (3,)."""
-    for i in range(3):
-        for k in range(i):
-            v[i] -= lower[i, k] * v[k]
-        v[i] /= lower[i, i]
-    solve_upper(lower, v)
 
 
 @kernel()
@@ -303,6 +265,7 @@ def refine(
     guess: Array,
     beams: Array,
     prior: Array,
+    rare: float,
     rounds: int,
     every: int,
     reach: int,
@@ -318,7 +281,8 @@ def refine(
         pose: initial pose, changed in place, shape (3,).
         guess: the odometry's, shape (3,).
         beams: see `match_particles`.
-        prior: information of the guess, shape (3, 3).
+        prior: see `prior_kernels`.
+        rare: likewise.
         rounds: maximum number of steps.
         every: start with every n-th beam, and use all near the end.
         reach: of `nearest_wall`.
@@ -331,10 +295,7 @@ def refine(
     """
     information, slope, variance = np.empty((3, 3)), np.empty(3), WIDEST
     for _ in range(rounds):
-        information[:] = prior
-        off_x, off_y, turn = pose[0] - guess[0], pose[1] - guess[1], pose[2] - guess[2]
-        for i in range(3):
-            slope[i] = prior[i, 0] * off_x + prior[i, 1] * off_y + prior[i, 2] * turn
+        add_prior(pose, guess, prior, rare, information, slope)
         variance = add_beams(table, cells, pose, beams, every, reach, weight, lonely, information, slope)
         factorise(information, lower)
         solve(lower, slope)
@@ -350,16 +311,18 @@ def refine(
 
 
 @kernel(
-    "void(int32[:, :, ::1], uint16[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1],"
-    " float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1])"
+    "void(int32[:, :, ::1], uint16[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1],"
+    " float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1])"
 )
 def match_particles(
     tables: Table,
     cells: Cells,
     guesses: Array,
+    starts: Array,
     beams: Array,
     headings: Array,
     deviation: Array,
+    scale: Array,
     noise: Array,
     tuning: Array,
     poses: Array,
@@ -371,45 +334,64 @@ def match_particles(
         tables: of the particles' maps, shape (N, TY, TX).
         cells: of all maps.
         guesses: the odometry's poses x, y [cells], yaw, shape (N, 3).
+        starts: where the search begins, likewise, shape (N, 3).
         beams: ends x, y [cells], directions and unit normals of the walls (0 without a line) in the
             robot's frame, shape (K, 6).
         headings: before the move, shape (N,).
-        deviation: of the odometry's move ahead, to the left [cells] and in turning, shape (3,).
+        deviation: of the odometry's move ahead, to the left [cells] and in turning, by the parameters, shape (3,).
+        scale: how much of it is real, see `OdometryNoise`, shape (3,).
         noise: standard normal numbers, shape (N, 3).
         tuning: lstep [cells], astep, halvings, rounds, beams to skip in the search, reach, sigma, lsigma [cells2],
             null [cells2], beams to skip in the likelihood, information of a beam [1/cells2], share of it for a
-            beam without a line, least score, shape (13,).
+            beam without a line, least score, gain of a beam's score against the prior, shape (14,).
         poses: filled with the drawn poses, shape (N, 3).
         fits: filled with the score (0 for a failed match), logarithm of the likelihood at the match, the match's x, y
-            [cells], yaw and the variance of the beams' distances from the walls there [cells2], shape (N, 6).
+            [cells], yaw, the variance of the beams' distances from the walls there [cells2], and the logarithm of the
+            match's probability, up to a constant, shape (N, 7).
     """
-    lstep, astep, halvings, rounds, every, reach_, sigma, lsigma, null, lskip, weight, lonely, least = tuning
+    lstep, astep, halvings, rounds, every, reach_, sigma, lsigma, null, lskip, weight, lonely, least, gain = tuning
     reach, fine = int(reach_), max(beams.shape[0] // FIRST_BEAMS, 1)
-    gain = 0.5 * sigma * weight
-    lower, prior, pose, climbed, drawn = np.empty((3, 3)), np.zeros((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    lower, prior, pose, climbed, drawn = np.empty((3, 3)), np.empty((2, 3, 3)), np.empty(3), np.empty(3), np.empty(3)
     for i in range(guesses.shape[0]):
-        table = tables[i]
-        c, s = math.cos(headings[i]), math.sin(headings[i])
-        ahead, aside = 1.0 / deviation[0] ** 2, 1.0 / deviation[1] ** 2
-        prior[0, 0], prior[1, 1] = c * c * ahead + s * s * aside, s * s * ahead + c * c * aside
-        prior[0, 1] = prior[1, 0] = c * s * (ahead - aside)
-        prior[2, 2] = 1.0 / deviation[2] ** 2
-        pose[:] = guesses[i]
-        climb(table, cells, pose, beams, prior, lstep, astep, int(halvings), int(every), reach, sigma, gain)
+        table, guess = tables[i], guesses[i]
+        rare = fill_prior(headings[i], deviation, scale, prior)
+        pose[:] = starts[i]
+        climb(
+            table, cells, pose, guess, beams, prior, rare, lstep, astep, int(halvings), int(every), reach, sigma, gain
+        )
         climbed[:] = pose
         fits[i, 5] = refine(
-            table, cells, pose, guesses[i], beams, prior, int(rounds), fine, reach, weight, lonely, lower
+            table, cells, pose, guess, beams, prior, rare, int(rounds), fine, reach, weight, lonely, lower
         )
-        before = score_of(table, cells, climbed[0], climbed[1], climbed[2], beams, fine, reach, sigma)
-        if score_of(table, cells, pose[0], pose[1], pose[2], beams, fine, reach, sigma) < LOSS * before:
+        before = fine * score_of(table, cells, climbed[0], climbed[1], climbed[2], beams, fine, reach, sigma)
+        after = fine * score_of(table, cells, pose[0], pose[1], pose[2], beams, fine, reach, sigma)
+        won = gain * (after - before) - prior_cost(pose, guess, prior, rare) + prior_cost(climbed, guess, prior, rare)
+        if won < -LOSS and after < WELL * beams.shape[0]:
             pose[:], fits[i, 5] = climbed, WIDEST
+            climb(
+                table,
+                cells,
+                pose,
+                guess,
+                beams,
+                prior,
+                rare,
+                lstep * FINER,
+                astep * FINER,
+                int(halvings),
+                fine,
+                reach,
+                sigma,
+                gain,
+            )
         fits[i, 0], fits[i, 1] = fit_of(table, cells, pose, beams, int(lskip), reach, sigma, lsigma, null)
         if fits[i, 0] <= least:
-            pose[:], fits[i, 5] = guesses[i], WIDEST
-            factorise(prior, lower)
+            pose[:], fits[i, 5] = guess, WIDEST
+            factorise(prior[0], lower)
             _, fits[i, 1] = fit_of(table, cells, pose, beams, int(lskip), reach, sigma, lsigma, null)
             fits[i, 0] = 0.0
         fits[i, 2:5] = pose
+        fits[i, 6] = gain * fits[i, 0] - prior_cost(pose, guess, prior, rare)
         drawn[:] = noise[i]
         solve_upper(lower, drawn)
         poses[i] = pose + drawn

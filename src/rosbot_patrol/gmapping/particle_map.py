@@ -151,6 +151,13 @@ class ParticleMaps:
         self.tables = np.ascontiguousarray(self.tables[indices])
         kernels.count_references(self.tables, self.refs, self.free)
 
+    def walls(self, index: int, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which cells of a map are walls in matching, in its tiles from x, y `low` to before `high`, 16 cells each."""
+        table = self.tables[index, low[1] : high[1], low[0] : high[0]]
+        rows = np.where(table[..., None] >= 0, self.cells[table, AREA:, WALLS], 0)  # bits, shape (TY, TX, 16)
+        walls = (rows[..., None] >> np.arange(TILE)) & 1
+        return np.ascontiguousarray(walls.swapaxes(1, 2).reshape(len(table) * TILE, -1) > 0)
+
     def grid(self, index: int, threshold: float) -> Grid:
         """One map as int8 cells: 100 if more than `threshold` of the beams ended there, 0 if fewer, -1 unknown."""
         info = self.info

@@ -30,6 +30,7 @@ log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 
 JUMP_M, JUMP_SPEED = 1.0, 5.0  # odometry that moves farther than this and faster is a restart, not a motion
+STEP_S = 1.0  # what a step between scans of the same stamp counts, as in logs without times
 RESTART_S = 1.0  # time that goes back by more than this is a restart; by less, scans came out of order
 
 
@@ -43,6 +44,7 @@ class Outcome:
         failed: number of particles that followed the odometry after a failed match.
         is_blind: the robot moved, but no beam of the scan is usable.
         effective: effective number of particles at this update.
+        fit: share of the scan's beams that lie on walls of the best particle's map, before the scan is written into it.
     """
 
     updated: bool = False
@@ -50,6 +52,7 @@ class Outcome:
     failed: int = 0
     is_blind: bool = False
     effective: float = 0.0
+    fit: float = 1.0
 
 
 class Slam:
@@ -171,7 +174,9 @@ class Slam:
             self.poses += _in_map(noise * sigmas, headings)
             self._trajectories.add(self.poses, np.arange(len(self.poses)))
             return Outcome(updated=True, is_blind=True)
-        found = self._matcher.match(self.maps, guesses, headings, beams, sigmas, noise=noise)
+        best = self.best
+        found = self._matcher.match(self.maps, guesses, headings, beams, sigmas, best=best, noise=noise)
+        fit = float(found.scores[best]) / np.count_nonzero(beams.is_hit)
         self.poses = found.poses
         self._log_weights += found.log_likelihoods
         self._totals += found.log_likelihoods
@@ -180,7 +185,7 @@ class Slam:
         self._trajectories.add(self.poses, parents)
         failed = int(np.count_nonzero(found.scores <= self._params.minimumScore))
         resampled = effective < self._params.resampleThreshold * len(self.poses)
-        return Outcome(updated=True, resampled=resampled, failed=failed, effective=effective)
+        return Outcome(updated=True, resampled=resampled, failed=failed, effective=effective, fit=fit)
 
     def _resample_when_due(self) -> tuple[NDArray[np.int64], float]:
         """Index of each particle's parent, and the effective number of particles."""
@@ -215,7 +220,7 @@ class Slam:
         way = math.hypot(odometry.x - self._odometry.x, odometry.y - self._odometry.y)
         if elapsed < -RESTART_S:
             log.warning("time went back by %.3f s: going on from the last pose", -elapsed)
-        elif way > JUMP_M + JUMP_SPEED * abs(elapsed):
+        elif way > JUMP_M + JUMP_SPEED * (abs(elapsed) or STEP_S):
             log.warning("the odometry jumped by %.2f m in %.2f s: taken as its restart, not as a motion", way, elapsed)
         else:
             return

@@ -151,3 +151,17 @@ def seen_map(passed: Mask, filled: Mask, ix: int, iy: int) -> NDArray[np.int8]:
     cells[free] = FREE
     cells[passed & filled & beside & ~free] = OCCUPIED
     return cells
+
+
+def grown(mask: Mask, cells: float) -> Mask:
+    """A mask grown by this many cells: every cell within that distance of one of it."""
+    out = mask.copy()
+    reach = math.ceil(cells)
+    for dy in range(-reach, reach + 1):
+        for dx in range(-reach, reach + 1):
+            if dx * dx + dy * dy > cells * cells:
+                continue
+            to = (slice(max(dy, 0), mask.shape[0] + min(dy, 0)), slice(max(dx, 0), mask.shape[1] + min(dx, 0)))
+            of = (slice(max(-dy, 0), mask.shape[0] + min(-dy, 0)), slice(max(-dx, 0), mask.shape[1] + min(-dx, 0)))
+            out[to] |= mask[of]
+    return out

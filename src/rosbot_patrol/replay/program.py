@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import re
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -30,7 +31,8 @@ from rosbot_patrol.replay.results.plots import write_plots
 from rosbot_patrol.replay.results.tables import Result, load_result, save_result
 from rosbot_patrol.replay.runner import chosen_topics
 
-SAME, DIFFERS, BAD_INPUT = 0, 1, 2
+_MISSING = re.compile(r"no transform from '([^']+)' to '([^']+)'")
+SAME, DIFFERS, NO_UPDATE, BAD_INPUT = 0, 1, 1, 2
 BAR, EVERY_S = 30, 0.1  # width of the progress bar, and its drawing period
 
 
@@ -84,6 +86,9 @@ def run(arguments: Sequence[str]) -> int:
             return _list(options.bag)
         case = _case(options, remaps)
         result = _replayed(case, is_quiet=options.quiet)
+        if result.counts.get("updates") == 0:
+            sys.stderr.write(f"replay: {_no_update(case, result)}\n")
+            return NO_UPDATE
         return _finish(case, result, options)
     except PatrolError as err:
         sys.stderr.write(f"replay: {err}\n")
@@ -140,6 +145,19 @@ def _replayed(case: Case, *, is_quiet: bool) -> Result:
         left_out = f"  left out: {result.facts['left out']}\n" if "left out" in result.facts else ""
         sys.stdout.write(f"  {counts}\n{left_out}  result {result.digest}\n")
     return result
+
+
+def _no_update(case: Case, result: Result) -> str:
+    """A result without an update, in words: nothing of it is worth keeping."""
+    why = result.facts.get("left out")
+    left_out = f" Left out: {why}." if why else ""
+    missing = _MISSING.search(why or "")
+    told = "x y z yaw pitch roll {1} {0}".format(*missing.groups()) if missing else "x y z yaw pitch roll PARENT CHILD"
+    return (
+        f"{result.node} has made no update over {case.bag}, so nothing is written.{left_out} Compare the names of its"
+        f" frames and topics with the bag's: `replay {case.bag}` lists them, and --transform '{told}' gives a missing"
+        " transform, such as where the lidar is mounted"
+    )
 
 
 def _finish(case: Case, result: Result, options: argparse.Namespace) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from mapped_room import scan_at, small
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.gmapping.core import GmappingCore, Step
+from rosbot_patrol.maps.map_io import write_map
 from rosbot_patrol.tf.tree import Edge, TransformTree
 
 AT_LASER = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -59,3 +61,23 @@ def test_scans_without_an_echo_are_told_until_they_are_well(caplog: pytest.LogCa
     assert caplog.text.count("no beam of the scan") == 1
     run.see(4.0)
     assert run.core.problem == ""
+
+
+@pytest.mark.parametrize(
+    ("start", "is_strange"),
+    [((0.1, 0.0, 0.0), False), ((0.3, 0.2, 0.15), False), ((0.1, 0.0, 1.5), True), ((2.5, 1.0, 0.0), True)],
+)
+def test_a_saved_map_that_does_not_fit_is_told_at_the_first_scan(
+    tmp_path: Path, start: tuple[float, float, float], is_strange: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    first = Run()
+    for i in range(1, 9):
+        first.see(float(i))
+    write_map(str(tmp_path / "room"), first.core.slam.grid())
+    x, y, yaw = start
+    again = Run(map_file=str(tmp_path / "room.yaml"), initial_pose_x=x, initial_pose_y=y, initial_pose_a=yaw)
+    again.see(1.0)
+    told = "is it a map of this place, and initial_pose_x, _y and _a where the robot is on it?"
+    assert (told in caplog.text) == (told in again.core.problem) == is_strange
+    again.see(2.0)
+    assert (told in again.core.problem) == is_strange

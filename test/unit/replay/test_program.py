@@ -123,12 +123,15 @@ def test_bad_input_is_a_sentence_and_2(run, drive: Path, words: tuple[str, ...],
     assert "Traceback" not in said
 
 
-def test_why_scans_were_left_out_is_told(run, tmp_path: Path) -> None:
+def test_no_update_is_told_with_its_reason_and_writes_nothing(run, tmp_path: Path) -> None:
     messages = [each for each in drive_messages(3.0) if each[1] != "/tf_static"]
     path = write_bag(tmp_path / "a.bag", messages)
-    status, said = run(path, "--node", "slam_gmapping")
-    assert status == 0
+    status, said = run(path, "--node", "slam_gmapping", "--save-map", tmp_path / "map", "--record", tmp_path / "a.npz")
+    assert status == 1
+    assert "slam_gmapping has made no update over" in said
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.bag"]
     assert "left out: no transform from 'laser' to 'base_link': nothing was told of the frame 'laser'" in said
+    assert "--transform 'x y z yaw pitch roll base_link laser' gives a missing transform" in said
 
 
 def test_a_bag_without_messages(run, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.gmapping.core import GmappingCore, Step
 from rosbot_patrol.gmapping.parameters import GmappingParams
-from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.known_part import known_part
 from rosbot_patrol.replay.bags.records import KINDS
 from rosbot_patrol.replay.results.comparison import Field
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows, Table
@@ -81,7 +81,8 @@ class GmappingReplay:
         """The best pose at each update, the intermediate maps, the best particle's trajectory and map."""
         tables = {"poses": self._poses.table(), "maps": self._maps.table(), "trajectory": self._trajectory()}
         feed = self._core.feed
-        maps = {"map": known_part(self._core.slam.grid())}
+        grid = self._core.slam.grid()
+        maps = {"map": known_part(grid, grid.info.resolution)}
         return Result("slam_gmapping", feed.facts(), feed.counts() | self._counts, tables, maps)
 
     def _note(self, step: Step) -> None:
@@ -106,19 +107,3 @@ class GmappingReplay:
             return Rows(STAMP, "x", "y", "yaw").table()
         x, y, yaw = self._core.slam.trajectory.T
         return {STAMP: np.array(self._core.slam.stamps), "x": x, "y": y, "yaw": yaw}
-
-
-def known_part(grid: Grid) -> Grid:
-    """The known part of a map with a margin of one cell; one cell if nothing is known."""
-    rows, columns = (np.flatnonzero((grid.cells >= 0).any(axis=axis)) for axis in (1, 0))
-    if not len(rows):
-        return Grid(_cut(grid, 0, 0, 1, 1), grid.cells[:1, :1].copy())
-    y0, y1 = max(int(rows[0]) - 1, 0), min(int(rows[-1]) + 2, grid.info.height)
-    x0, x1 = max(int(columns[0]) - 1, 0), min(int(columns[-1]) + 2, grid.info.width)
-    return Grid(_cut(grid, x0, y0, x1 - x0, y1 - y0), grid.cells[y0:y1, x0:x1].copy())
-
-
-def _cut(grid: Grid, x0: int, y0: int, width: int, height: int) -> GridInfo:
-    info = grid.info
-    x, y = info.origin_x + x0 * info.resolution, info.origin_y + y0 * info.resolution
-    return GridInfo(resolution=info.resolution, width=width, height=height, origin_x=x, origin_y=y, yaw=info.yaw)

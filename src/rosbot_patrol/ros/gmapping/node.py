@@ -6,7 +6,9 @@ parameters in `GmappingParams`. Written from Grisetti, Stachniss, Burgard 2007 a
 
 Differs:
 - A map's cells lie as its origin says; upstream's are half a cell off.
-- Gauss-Newton across the walls refines the search for the best fit.
+- Gauss-Newton across the walls refines the search for the best fit, where the pose does not become less likely.
+- If a scan fits worse than usual, the surroundings of the odometry's guess are searched: wheels may have slipped.
+- The odometry's noise is learned; the parameters are its upper bound, apart from slips.
 - The proposal is the Gaussian of match and odometry. The odometry's error grows with the distance between updates, not
   with the number of scans.
 - Beams that graze a wall do not erase it within a scan.

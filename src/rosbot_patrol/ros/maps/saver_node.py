@@ -3,8 +3,9 @@
 Matches map_saver of ROS Noetic's navigation 1.17: `map_saver [--occ 65] [--free 25] [-f map]`, `map:=TOPIC`; the
 pgm and the yaml are equal byte for byte.
 
-Differs: with `-f FOLDER/NAME` the yaml names the picture `NAME.pgm`, because map_server looks for it beside the yaml
-(upstream writes `FOLDER/NAME.pgm`, which is then not found). Until a map comes it logs a line every 10 s. A file is
+Differs: `--crop [METRES]` leaves out what is unknown, but for a margin (1 m). With `-f FOLDER/NAME` the yaml names the
+picture `NAME.pgm`, because map_server looks for it beside the yaml (upstream writes `FOLDER/NAME.pgm`, which is then
+not found). Until a map comes it logs a line every 10 s. A file is
 written whole or not at all. An unwritable file is an error (exit 1); upstream reports success. Typed by hand, it ends
 after 5 s without a ROS master.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 import sys
 import threading
 from typing import NoReturn
@@ -22,6 +24,7 @@ from nav_msgs.msg import OccupancyGrid
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.grid import Grid
+from rosbot_patrol.maps.known_part import known_part
 from rosbot_patrol.maps.map_io import write_map
 from rosbot_patrol.ros.messages.convert import grid_from_msg
 from rosbot_patrol.ros.messages.fast_arrays import GridMsg
@@ -35,7 +38,7 @@ REMIND_S = 10.0
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise ParamError("arguments", f"{message}; expected map_saver [--occ 65] [--free 25] [-f map]")
+        raise ParamError("arguments", f"{message}; expected map_saver [--occ 65] [--free 25] [--crop [1.0]] [-f map]")
 
 
 def arguments_of(words: list[str]) -> argparse.Namespace:
@@ -43,6 +46,9 @@ def arguments_of(words: list[str]) -> argparse.Namespace:
     parser = _Parser(prog="map_saver", description="Save one map to disk.", allow_abbrev=False)
     parser.add_argument("--occ", type=int, default=65, help="from here on a cell is a wall, 1 to 100")
     parser.add_argument("--free", type=int, default=25, help="up to here a cell is free, 0 to 100")
+    parser.add_argument(
+        "--crop", type=float, nargs="?", const=1.0, metavar="METRES", help="only what is known, and this margin (1.0)"
+    )
     parser.add_argument("-f", default="map", metavar="NAME", help="writes NAME.pgm and NAME.yaml")
     found = parser.parse_args(words)
     if not 1 <= found.occ <= 100:
@@ -51,6 +57,8 @@ def arguments_of(words: list[str]) -> argparse.Namespace:
         raise ParamError("--free", f"is {found.free}, expected 0 to 100")
     if found.occ <= found.free:
         raise ParamError("--free", f"is {found.free}, expected less than --occ {found.occ}")
+    if found.crop is not None and not 0.0 <= found.crop < math.inf:
+        raise ParamError("--crop", f"is {found.crop}, expected the margin in metres, 0 or more")
     return found
 
 
@@ -88,6 +96,9 @@ def body() -> None:
         return
     info = grid.info
     log.info("Received a %d X %d map @ %.3f m/pix", info.width, info.height, info.resolution)
+    if wanted.crop is not None:
+        grid = known_part(grid, wanted.crop)
+        log.info("Its known part has %d X %d cells", grid.info.width, grid.info.height)
     pgm, text = write_map(wanted.f, grid, occupied=wanted.occ, free=wanted.free)
     log.info("Writing map occupancy data to %s", pgm)
     log.info("Writing map occupancy data to %s", text)

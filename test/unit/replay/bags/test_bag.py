@@ -300,3 +300,47 @@ def test_an_empty_definition_is_that_of_noetic_where_the_sum_is(tmp_path: Path) 
     other = bag_with_header(tmp_path / "other.bag", message_definition=b"", md5sum=b"0" * 32)
     with Bag(other) as bag:
         assert {each.msgdef for each in bag._reader.connections} == {""}
+
+
+# -- index records that rosbag takes
+
+
+def index_headers(data: bytes) -> list[int]:
+    """Places of the headers of index records: of connection, number of entries and version."""
+    return [
+        found.start()
+        for found in re.finditer(rb"\x2f\x00\x00\x00(?=.{47})", data, re.DOTALL)
+        if b"conn=" in data[found.start() : found.start() + 51]
+    ]
+
+
+@pytest.mark.parametrize("damage", ["another order", "a wrong length"])
+def test_an_index_is_read_as_rosbag_reads_it(tmp_path: Path, damage: str) -> None:
+    maker = Maker()
+    text = maker.new(OTHER_TOPIC, "hello")
+    scans = [(BEGIN + k, "/scan", maker.scan(scan_at(BEGIN + k))) for k in range(3)]
+    path = write_bag(tmp_path / "made.bag", [*scans, (BEGIN + 5.0, "/said", text)])
+    data = bytearray(path.read_bytes())
+    first, second = index_headers(data)
+    for place in (second,) if damage == "another order" else (first, second):
+        fields, at = [], place + 4
+        while at < place + 51:
+            (size,) = struct.unpack_from("<I", data, at)
+            fields.append(bytes(data[at : at + 4 + size]))
+            at += 4 + size
+        if damage == "another order":
+            data[place + 4 : place + 51] = b"".join(reversed(fields))
+        else:
+            data[place + 51 : place + 55] = bytes(4)
+    path.write_bytes(bytes(data))
+    assert len(read(path, "/scan")) == 3
+
+
+def test_an_index_that_ends_early_is_a_sentence(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "made.bag", some_messages())
+    data = bytearray(path.read_bytes())
+    place = index_headers(data)[0]
+    at = data.index(b"count=", place) + 6
+    data[at : at + 4] = b"\xff\xff\xff\x0f"
+    path.write_bytes(bytes(data))
+    assert "made.bag" in refused(path)

@@ -20,7 +20,7 @@ from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.replay.bags.bag import Bag
 from rosbot_patrol.replay.nodes import amcl as amcl_replay
 from rosbot_patrol.replay.nodes.amcl import AmclReplay
-from rosbot_patrol.replay.nodes.gmapping import GmappingReplay, known_part
+from rosbot_patrol.replay.nodes.gmapping import GmappingReplay
 from rosbot_patrol.replay.results.comparison import compare
 from rosbot_patrol.replay.results.tables import Result
 from rosbot_patrol.replay.runner import Replay, run_replay
@@ -185,16 +185,6 @@ def test_every_second_scan_with_throttle_scans(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "a.bag", without())
     throttled = GmappingParams(particles=2, throttle_scans=2, xmin=-6.0, ymin=-6.0, xmax=6.0, ymax=6.0)
     assert replayed(path, GmappingReplay(throttled)).counts["scans"] == 8
-
-
-def test_the_known_part_of_a_map() -> None:
-    cells = np.full((10, 20), -1, dtype=np.int8)
-    cells[4:6, 7:9] = 0
-    part = known_part(Grid(GridInfo(resolution=0.5, width=20, height=10, origin_x=-1.0, origin_y=3.0), cells))
-    assert (part.info.origin_x, part.info.origin_y, part.info.width, part.info.height) == (2.0, 4.5, 4, 4)
-    assert part.cells[1:3, 1:3].tolist() == [[0, 0], [0, 0]]
-    nothing = known_part(Grid(GridInfo(resolution=0.5, width=20, height=10), np.full((10, 20), -1, dtype=np.int8)))
-    assert nothing.cells.tolist() == [[-1]]
 
 
 def test_a_planted_fault_in_amcl_is_caught_and_named(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
