@@ -61,8 +61,8 @@ def obey():
             volts.publish(Float32(values[0]))
         elif words[0] == "ticks":
             left.publish(Int32(int(values[0])))
-            rospy.sleep(0.02)
             right.publish(Int32(int(values[1])))
+            rospy.sleep(0.02)
         elif words[0] == "links":
             tell(links=[p.get_num_connections() for p in (command, odometry, volts, left, right)])
 threading.Thread(target=obey, daemon=True).start()

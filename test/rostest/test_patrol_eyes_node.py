@@ -124,8 +124,11 @@ def test_a_picture_on_the_wall_is_clear_and_said(house, sight):
     house.start_patrol(look_around="spin", clear_share=0.0)
     wait_until(lambda: "floor of the rooms" in house.log(house.patrol), 30, "the rooms")
     sight.flat = house.person = True
-    house.send(2)
-    last = house.wait_for_mission()
+    for count in (1, 2, 3):  # on a busy machine the depth may come after the robot has turned on: somebody somewhere
+        house.send(2)
+        last = house.wait_for_mission(count)
+        if last.last_verdict != "unverified":
+            break
     assert last.last_verdict == "clear", last.why
     assert "it is flat" in last.why
     assert house.mails() == []

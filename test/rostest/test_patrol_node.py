@@ -201,9 +201,10 @@ def test_unreachable_mail_server_loses_and_hangs_nothing(house):
     assert len(list((house.folder / "state" / "outbox").glob("*.notice"))) == 1
 
 
-def test_sigint_cancels_the_goal_and_stops_the_wheels(house):
+@pytest.mark.parametrize("keep", [False, True])
+def test_sigint_cancels_the_goal_and_stops_the_wheels(house, keep):
     house.start_move_base()
-    house.start_patrol()
+    house.start_patrol(keep_calls_at_end=keep)
     house.send(1)
     wait_until(lambda: any(house.twists), 20, "the turn")
     began = time.monotonic()
@@ -213,7 +214,7 @@ def test_sigint_cancels_the_goal_and_stops_the_wheels(house):
     wait_until(lambda: house.twists[-1] == 0.0, 2, "the zero twist")
     assert "Traceback" not in house.log(house.patrol)
     kept = json.loads((house.folder / "state" / "patrol.json").read_text())
-    assert kept["memory"]["mission"] is None
+    assert (kept["memory"]["mission"] is not None) == keep  # it goes on at the next start
 
 
 def test_rosnode_kill_and_respawn_goes_on(house):

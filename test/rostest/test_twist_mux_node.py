@@ -160,8 +160,13 @@ def test_scans_that_are_none_leave_a_crawl_and_are_named(ros, base, quaternion, 
     lidar = Lidar(base, quaternion, **changes)
     assert turned(base, lidar, 1.5) == pytest.approx(0.4)
     mux.says(named)
-    wait_for(lambda: named in lidar.told() and "level: 1" in lidar.told(), 5.0, "a warning on /diagnostics")
-    assert "patrol drives; no usable scan yet" in lidar.told()
+    words = (named, "level: 1", "patrol drives; no usable scan yet")
+
+    def is_told():  # while somebody commands
+        base.tell(publish=["/cmd_vel/patrol", {"angular": {"z": 1.5}}])
+        return all(word in lidar.told() for word in words)
+
+    wait_for(is_told, 5.0, "a warning on /diagnostics")
     assert sum(named in line and "lets the base creep only" in line for line in mux.output.splitlines()) == 1
 
 

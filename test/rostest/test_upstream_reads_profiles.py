@@ -97,7 +97,9 @@ BOUNDS = {
     "z_voxels": (0, 16),
 }
 # Names of ours that upstream never asks for.
-OURS = {"depth_sources", "forget_unseen_after", "forget_out_of_view_after", "forget_beside_after"}
+OURS = {
+    "depth_sources", "forget_unseen_after", "forget_out_of_view_after", "forget_beside_after", "remember_standing",
+}  # fmt: skip
 PLANNERS = {"navfn/NavfnROS", "base_local_planner/TrajectoryPlannerROS"}
 
 

@@ -1,4 +1,4 @@
-"""The guide from nothing to a guarded flat, by the browser alone: scripts/patrol new_house:=true."""
+"""The guide from nothing to a guarded house, by the browser alone: scripts/patrol new_house:=true."""
 
 import os
 import signal
@@ -12,19 +12,36 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from console_browser import Browser
 
+from rosbot_patrol.campaign.houses.drawn import drawn_house_files
 from rosbot_patrol.console.live.map_picture import draw_map
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.patrol.house.rooms import load_rooms
+from rosbot_patrol.simulation.plans.catalogue import load_catalogue
 
 ROOT = Path(__file__).parents[2]
-POINTS = ((0.0, 0.0, "base"), (3.0, 0.3, "study"))
+DRAWN = 1_000_203  # seed of a house that nobody has made by hand
 
 
 @pytest.fixture
-def patrol(tmp_path):
+def place(request, tmp_path):
+    """Arguments of the launch, names of map, rooms and sensors in the house's folder, and the points to tap."""
+    if request.param == "flat":
+        return (
+            ["house:=flat"],
+            ("flat_map", "flat_room_points", "flat_sensors"),
+            ((0.0, 0.0, "base"), (3.0, 0.3, "study")),
+        )
+    folder = tmp_path / "drawn"
+    files = drawn_house_files(DRAWN, folder, load_catalogue(ROOT / "config"))
+    points = [(room.pose.x, room.pose.y, f"my {room.name}") for room in load_rooms(files.rooms)]
+    return [f"world:={files.world}", f"motion_sensors:={files.sensors}"], ("rosbot_map", "room_points", ""), points
+
+
+@pytest.fixture
+def patrol(tmp_path, place):
     env = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
     env |= {"ROS_MASTER_URI": "http://localhost:11391", "ROS_HOME": str(tmp_path / "ros")}
-    command = [str(ROOT / "scripts" / "patrol"), "new_house:=true", "house:=flat", "rate:=0", "gui:=false"]
+    command = [str(ROOT / "scripts" / "patrol"), "new_house:=true", *place[0], "rate:=0", "gui:=false"]
     command += ["console_port:=18440", f"state_dir:={tmp_path / 'state'}", "browser:=false"]
     log = (tmp_path / "words").open("w")
     process = subprocess.Popen(command, env=env, stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
@@ -43,7 +60,10 @@ def wait_for(condition, seconds, what):
 
 
 @pytest.mark.long
-def test_from_nothing_to_a_guarded_flat(patrol, tmp_path):
+@pytest.mark.parametrize("place", ["flat", "drawn"], indirect=True)
+def test_from_nothing_to_a_guarded_house(patrol, place, tmp_path):
+    _, (map_name, rooms_name, sensors_name), points = place
+    room = points[1][2]
     words = lambda: patrol.words.read_text()  # noqa: E731
     wait_for(lambda: "Set up the house on the page" in words(), 120, words())
     url = words().partition("on the page ")[2].split()[0]
@@ -62,25 +82,26 @@ def test_from_nothing_to_a_guarded_flat(patrol, tmp_path):
         page.press("Next")
         page.see("None yet. The first one is the base")
         house = tmp_path / "state" / "house"
-        for x, y, name in POINTS:
+        for x, y, name in points:
             page.press("Add a room")
-            tap(page, house / "flat_map.yaml", x, y)
+            tap(page, house / f"{map_name}.yaml", x, y)
             page.type("Name", name)
             page.press("Save")
             page.see(name)
         page.save("guide-rooms")
-        assert [room.name for room in load_rooms(house / "flat_room_points.yaml")] == ["base", "study"]
+        assert [each.name for each in load_rooms(house / f"{rooms_name}.yaml")] == [name for _, _, name in points]
         for _ in range(3):
             page.press("Next")
         page.press("Start the guard")
         page.see("The guard starts.")
         page.see("On guard. All is quiet.", 120.0)
-        assert (house / "flat_sensors.yaml").exists()
+        if sensors_name:  # else there was a file of the sensors before
+            assert (house / f"{sensors_name}.yaml").exists()
         page.save("guide-guard")
         page.press("Look at all rooms")
-        page.see("Looking around in study", 200.0)
+        page.see("Looking around in", 300.0)
         page.open("/house")
-        page.see("1 study")
+        page.see(f"1 {room}")
     finally:
         page.close()
 

@@ -39,7 +39,7 @@ ROWS_INSIDE: dict[str, list[set[str]]] = {
         {"dispatch"},
     ],
     "simulation": [
-        {"noise", "meshes", "devices"},
+        {"noise", "meshes", "devices", "start_place", "plans"},
         {"scene"},
         {"sensors", "actors"},
         {"robot", "sdf"},
@@ -69,7 +69,7 @@ ROWS_INSIDE: dict[str, list[set[str]]] = {
     ],
     "rosserial": [{"protocol"}, {"server", "device"}],
     "ros": [
-        {"runtime", "messages"},
+        {"runtime", "messages", "models"},
         {
             "amcl",
             "maps",

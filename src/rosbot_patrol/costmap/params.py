@@ -95,6 +95,12 @@ class ObstacleParams:
         lo=0.0,
         doc="ours: the same within 0.6 m of the robot's centre, where it cannot look again; 0: as elsewhere",
     )
+    remember_standing: float = param(
+        0.0,
+        lo=0.0,
+        hi=100.0,
+        doc="ours: a mark is kept out of view for this many times as long as it was seen, 10 minutes at most",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -214,3 +214,16 @@ def test_a_file_that_somebody_has_broken_is_named(house: HouseFiles) -> None:
     house.path(ROOMS).write_text("rooms: [")
     with pytest.raises(ParamError, match=r"my_rooms\.yaml"):
         edit.save_room(house, room(1, "hall"))
+
+
+def test_the_rooms_of_a_new_house_are_marked_one_by_one_though_its_sensors_are_known(tmp_path: Path) -> None:
+    sensors = tmp_path / "my_sensors.yaml"
+    sensors.write_text("sensors: [{id: 1, room: 1}, {id: 2, room: 2}]\n")
+    given, around = Given(sensors=str(sensors)), Surroundings(home=tmp_path, environ={})
+    house = HouseFiles(tmp_path / "state", given, around, is_new=True)
+    for number, name in enumerate(("base", "hall", "kitchen")):
+        edit.save_room(house, room(number, name))
+    assert [spec.room for spec in house.sensors] == [1, 2]
+    later = HouseFiles(tmp_path / "state", given, around)
+    with pytest.raises(ParamError, match="there is no room 9"):
+        edit.save_sensor(later, 9, 9, "", is_enabled=True)

@@ -240,11 +240,11 @@ class HouseFiles:
                         paths[name].write_text(texts[name], "utf-8")
                         os.chmod(paths[name], 0o600)
             try:
-                self._load(paths)
+                self._load(paths, changed=set(texts))
             except ParamError as err:
                 raise ParamError(_renamed(err.name, paths, self), _renamed(err.problem, paths, self)) from err
 
-    def _load(self, paths: Mapping[str, Path]) -> None:
+    def _load(self, paths: Mapping[str, Path], changed: set[str]) -> None:
         read_zones(paths[SHAPES])
         if paths[KNOWN].exists():
             load_known(paths[KNOWN])
@@ -253,7 +253,8 @@ class HouseFiles:
         if not paths[ROOMS].exists():
             return
         rooms = load_rooms(paths[ROOMS])
-        _sensors(paths[SENSORS], rooms)
+        if not self._is_new or SENSORS in changed:  # in a new house their rooms are marked one by one
+            _sensors(paths[SENSORS], rooms)
         load_rules(str(paths[ARMING]) if paths[ARMING].exists() else "", rooms)
         load_schedule(str(paths[SCHEDULE]) if paths[SCHEDULE].exists() else "", rooms)
 

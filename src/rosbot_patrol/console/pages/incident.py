@@ -147,6 +147,7 @@ class _Page:
             if not await self._do(
                 f"know '{thing.name}' at ({thing.x}, {thing.y})",
                 lambda _who: edit.add_object(self._context.house, thing),
+                is_last=False,
             ):
                 return
         if is_muted:
@@ -175,8 +176,10 @@ class _Page:
         ):
             ui.navigate.to("/incidents")
 
-    async def _do(self, what: str, change: Callable[[str], None], *, manage: bool = False) -> bool:
-        """Change something on record, if the visitor still may."""
+    async def _do(
+        self, what: str, change: Callable[[str], None], *, manage: bool = False, is_last: bool = True
+    ) -> bool:
+        """Change something on record, if the visitor still may; after the last change the page is drawn anew."""
         desk, visitor = self._context.desk, self._view.visitor
         if not desk.may(visitor, manage=manage):
             say_problem(self._view, self._view.words("You may not do that, or are signed out."))
@@ -188,7 +191,8 @@ class _Page:
             return False
         desk.note(visitor, what)
         self._context.hub.count_incident()
-        ui.navigate.reload()
+        if is_last:
+            ui.navigate.reload()
         return True
 
     def _timeline(self) -> None:

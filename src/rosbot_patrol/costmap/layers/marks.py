@@ -13,6 +13,7 @@ from rosbot_patrol.grid import GridInfo
 
 _PERIOD = 0.2  # time between two checks of all marks [s]
 _LONGEST = 1.0  # maximum time in view that one check adds [s]
+_LONGEST_KEPT = 600.0  # time out of view after which even what had stood long is forgotten [s]
 _ROW = 1 << 31  # keys are (iy + half a row) * _ROW + ix + half a row
 _HALF = 1 << 30
 _BESIDE = 0.6  # marks nearer to the robot's centre may be where it cannot look again [m]
@@ -31,10 +32,12 @@ class MarkMemory:
         in_view: time in view and empty after which a mark is forgotten [s]; 0: never.
         out_of_view: time neither seen nor in view after which a mark is forgotten [s]; 0: never.
         beside: the same for a mark right beside the robot [s]; 0: as elsewhere.
+        standing: a mark that was seen for some time is kept out of view for this many times as long, if that is longer
+            than `out_of_view`: what has stood will stand, and what passed by has gone.
     """
 
-    def __init__(self, in_view: float, out_of_view: float, beside: float = 0.0) -> None:
-        self._in_view, self._out_of_view = in_view, out_of_view
+    def __init__(self, in_view: float, out_of_view: float, beside: float = 0.0, standing: float = 0.0) -> None:
+        self._in_view, self._out_of_view, self._standing = in_view, out_of_view, standing
         self._beside = max(beside, out_of_view)
         self._shift = (0, 0)
         self._next = float("-inf")
@@ -45,6 +48,8 @@ class MarkMemory:
         self._keys = np.empty(0, np.int64)
         self._empty_for = np.empty(0)
         self._last_view = np.empty(0)
+        self._first_hit = np.empty(0)
+        self._last_hit = np.empty(0)
 
     def __len__(self) -> int:
         return len(self._keys)
@@ -62,11 +67,14 @@ class MarkMemory:
         known[inside] = self._keys[at[inside]] == keys[inside]
         self._empty_for[at[known]] = 0.0
         self._last_view[at[known]] = now
+        self._last_hit[at[known]] = now
         if not known.all():
             where = at[~known]
             self._keys = np.insert(self._keys, where, keys[~known])
             self._empty_for = np.insert(self._empty_for, where, 0.0)
             self._last_view = np.insert(self._last_view, where, now)
+            self._first_hit = np.insert(self._first_hit, where, now)
+            self._last_hit = np.insert(self._last_hit, where, now)
 
     def expired(
         self, now: float, cells: CostCells, info: GridInfo, seen: Seen, robot: Pose2D | None = None
@@ -82,7 +90,7 @@ class MarkMemory:
         """
         none = np.empty((0, 2), np.int64)
         if now < self._next - 2.0 * _PERIOD:
-            self._last_view[:] = now
+            self._last_view[:] = self._first_hit[:] = self._last_hit[:] = now
             self._next = now
         if now < self._next:
             return none
@@ -102,10 +110,12 @@ class MarkMemory:
         if self._in_view > 0.0:
             old |= empty & (self._empty_for >= self._in_view)
         if self._out_of_view > 0.0:
-            longest = np.full(len(at), self._out_of_view)
+            stood = np.minimum(self._standing * (self._last_hit - self._first_hit), _LONGEST_KEPT)
+            longest = np.maximum(stood, self._out_of_view)
             if robot is not None:
                 x, y = (at + 0.5).T * info.resolution + [[info.origin_x], [info.origin_y]]
-                longest[np.hypot(x - robot.x, y - robot.y) < _BESIDE] = self._beside
+                is_beside = np.hypot(x - robot.x, y - robot.y) < _BESIDE
+                longest[is_beside] = np.maximum(longest[is_beside], self._beside)
             old |= now - self._last_view >= longest
         self._keep(~old)
         forgotten: NDArray[np.int64] = at[old]
@@ -119,6 +129,7 @@ class MarkMemory:
         if not which.all():
             self._keys, self._empty_for = self._keys[which], self._empty_for[which]
             self._last_view = self._last_view[which]
+            self._first_hit, self._last_hit = self._first_hit[which], self._last_hit[which]
 
     @staticmethod
     def _is_empty(at: NDArray[np.int64], info: GridInfo, seen: Seen) -> NDArray[np.bool_]:

@@ -44,7 +44,8 @@ class ObstacleLayer(Layer):
       erodes obstacles. Marks of earlier layers under the robot are cleared as well, such as a wall of the map that it
       overlaps by an error of its pose: upstream's robot finds no plan there.
     - `forget_unseen_after`, `forget_out_of_view_after` and `forget_beside_after` forget marks that have not been seen
-      again: see `marks`. They are 0 by default, as upstream, which only clears marks by beams.
+      again, and `remember_standing` keeps those longer that have stood: see `marks`. They are 0 by default, as
+      upstream, which only clears marks by beams.
     """
 
     def __init__(
@@ -63,7 +64,7 @@ class ObstacleLayer(Layer):
         self._outline: NDArray[np.float64] | None = None
         self._cleared = np.empty(_CLEARED, np.int32)
         ages = params.forget_unseen_after, params.forget_out_of_view_after, params.forget_beside_after
-        self._marks = MarkMemory(*ages) if max(ages) > 0.0 else None
+        self._marks = MarkMemory(*ages, params.remember_standing) if max(ages) > 0.0 else None
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
         """Adopt the master's place and size."""

@@ -8,7 +8,9 @@ from collections.abc import Collection, Iterable, Sequence
 from rosbot_patrol.patrol.calls.call_filter import CallFilter, Taken
 from rosbot_patrol.patrol.calls.own_motion import OwnMotion
 from rosbot_patrol.patrol.calls.queue import MissionQueue
+from rosbot_patrol.patrol.house.regions import RoomRegions
 from rosbot_patrol.patrol.house.rooms import Rooms
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
 from rosbot_patrol.patrol.mission.params import ManagerParams
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission, Verdict
@@ -53,6 +55,20 @@ class Agenda:
             is_awake: detector and camera speak.
         """
         self._own_motion.see(now, inputs.pose, awake=is_awake)
+
+    def see_motion(self, now: float, tracks: Iterable[LidarTrack], house: RoomRegions | None) -> None:
+        """Note in which rooms something moves: these go first.
+
+        Args:
+            now: steady time [s].
+            tracks: what the lidar follows.
+            house: the rooms on the map.
+        """
+        unrest = self._calls.unrest
+        for track in tracks:
+            if house is not None and track.has_moved:
+                unrest.move(house.room_at(track.x, track.y), now)
+        self.queue.stirring = unrest.stirring(now)
 
     def take(self, now: float, inputs: Inputs, mission: Mission | None, *, has_candidate: bool) -> Taken:
         """Take a step's calls; arguments as of `CallFilter.take`."""

@@ -1,7 +1,7 @@
 """From trigger to verdict: drive to the room, look around, say what is there, come home.
 
 Matches the tutorial's patrol_robot (a trigger of a room's sensor sends the robot there, it turns once, it comes back
-to room 0; persons and fire hydrants alarm).
+to room 0; persons alarm).
 
 Differs:
 - One mission runs at a time, and detections count while the robot drives, looks and returns. Calls that arrive
@@ -262,6 +262,7 @@ class PatrolManager:
     def _take_calls(self, inputs: Inputs, out: Commands) -> None:
         agenda, now = self._missions.agenda, self._time
         agenda.see_robot(now, inputs, is_awake=self._is_awake(inputs))
+        agenda.see_motion(now, self._parts.views.tracks() if self.mission else (), inputs.house)
         taken = agenda.take(now, inputs, self.mission, has_candidate=self._parts.decision.has_candidate(now))
         out.changed |= taken.changed
         out.ignored += taken.ignored

@@ -22,14 +22,12 @@ from rosbot_patrol.patrol.search.survey import SightParams
 from rosbot_patrol.patrol.search.turn import SpinParams
 from rosbot_patrol.patrol.senses.params import EyesTopics
 
-ALARM_CLASSES = ["person", "fire hydrant"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class BehaviourParams:
     """Parameters that the node and its manager share."""
 
-    alarm_classes: list[str] = param(ALARM_CLASSES, doc="object classes that raise an alarm")
+    alarm_classes: list[str] = param(["person"], doc="object classes that raise an alarm")
     own_motion_radius: float = param(
         2.0,
         unit="m",
@@ -82,6 +80,10 @@ class NodeParams(BehaviourParams, SightParams):
         "", doc="folder of outbox, incidents and queue; empty: rosbot_patrol(-NAMESPACE) in ROS's home"
     )
     image_topic: str = param("camera/rgb/image_raw", doc="camera for the pictures in mails; empty: none")
+    keep_calls_at_end: bool = param(
+        False,
+        doc="an end by a signal leaves mission and calls to the next start, as kill -9 does",
+    )
     rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="maximum rate of the patrol's steps")
     sensor_watch_after: float = param(
         20.0, unit="s", lo=6.0, doc="silence after which a running sensor_watch counts as gone or hung"

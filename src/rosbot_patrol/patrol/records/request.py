@@ -30,6 +30,7 @@ class Request:
         priority: the greatest goes first.
         id: of its future mission.
         triggers: number of calls of its sensor.
+        earlier: number of calls of its sensor before this one; fewer go first.
         times: time spent before the mission was put back (see Mission.times).
     """
 
@@ -40,6 +41,7 @@ class Request:
     priority: int = 0
     id: str = ""
     triggers: int = 1
+    earlier: int = 0
     times: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
 
@@ -62,5 +64,6 @@ def request_from_plain(plain: Mapping[str, Any]) -> Request:
         priority=int(plain["priority"]),
         id=str(plain["id"]),
         triggers=int(plain["triggers"]),
+        earlier=int(plain.get("earlier", 0)),  # records of 1.0 have none
         times={str(name): float(seconds) for name, seconds in plain["times"].items()},
     )

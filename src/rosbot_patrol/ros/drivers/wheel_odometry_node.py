@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import threading
 import time
 from dataclasses import dataclass
 
@@ -37,18 +38,19 @@ class WheelOdometryParams(WheelParams):
 
 
 class WheelOdometry:
-    """Two counters in, odometry out; both are read together when the right one has come."""
+    """Two counters in, odometry out; both are read together when each has come anew, in whatever order."""
 
     def __init__(self, params: WheelOdometryParams) -> None:
         self._params, self._odometry = params, TicksOdometry(params)
-        self._left: int | None = None
+        self._lock = threading.Lock()  # each topic has a thread
+        self._ticks: dict[str, int] = {}
         self._heard = -math.inf
         self._publisher = rospy.Publisher("odom", Odometry, queue_size=10)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10) if params.publish_tf else None
         self._health = diagnostics.Health(hardware_id="wheels")
         kind = {"Int16": Int16, "Int32": Int32}[params.message]
-        rospy.Subscriber("left_ticks", kind, self._on_left, queue_size=10, tcp_nodelay=True)
-        rospy.Subscriber("right_ticks", kind, self._on_right, queue_size=10, tcp_nodelay=True)
+        rospy.Subscriber("left_ticks", kind, lambda m: self._on_ticks("left", m), queue_size=10, tcp_nodelay=True)
+        rospy.Subscriber("right_ticks", kind, lambda m: self._on_ticks("right", m), queue_size=10, tcp_nodelay=True)
 
     def run(self) -> None:
         """Watch over the base until shutdown."""
@@ -63,16 +65,17 @@ class WheelOdometry:
             self._health.set("", level, text, {"restarts of the counters": self._odometry.restarts})
             time.sleep(0.2)
 
-    def _on_left(self, message: Int16 | Int32) -> None:
-        self._left = message.data
+    def _on_ticks(self, side: str, message: Int16 | Int32) -> None:
+        with self._lock:
+            self._ticks[side] = message.data
+            if len(self._ticks) == 2:
+                self._update(self._ticks.pop("left"), self._ticks.pop("right"))
 
-    def _on_right(self, message: Int16 | Int32) -> None:
+    def _update(self, left: int, right: int) -> None:
         self._heard = time.monotonic()
-        if self._left is None:
-            return
         stamp = rospy.Time.now()
         restarts = self._odometry.restarts
-        self._odometry.update(self._left, message.data, stamp.to_sec())
+        self._odometry.update(left, right, stamp.to_sec())
         if self._odometry.restarts > restarts:
             log.warning("the counters of the wheels have jumped: the base has restarted, or `fastest` is too small")
         self._publish(stamp)

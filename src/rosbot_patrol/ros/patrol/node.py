@@ -368,12 +368,12 @@ class PatrolNode:
     def _stop(self) -> None:
         """Stop the robot: cancel the goal, stop the wheels.
 
-        A signal (Ctrl-C, the end of the launch) also cancels missions; after any other end (`rosnode kill`) the
-        respawned node continues them.
+        A signal (Ctrl-C, the end of the launch) also cancels missions, unless `keep_calls_at_end`. After any other end
+        (`rosnode kill`) the respawned node continues them.
         """
         with self._stepping:
             self._is_over = True
-            if self._is_signalled:
+            if self._is_signalled and not self.params.keep_calls_at_end:
                 self._record(now(), self.manager.abandon("the patrol was ended"))
                 self.missed.end()
             self.move_base.cancel()

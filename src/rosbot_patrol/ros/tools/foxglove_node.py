@@ -83,6 +83,8 @@ class FoxgloveNode:
             raise ParamError("foxglove-sdk", f"is not installed ({err}): run scripts/bootstrap") from err
         self._topics: dict[str, _Topic] = {}
         self._by_channel: dict[int, _Topic] = {}
+        self._early: dict[int, int] = {}  # viewers of a channel that is advertised, and not in _by_channel yet
+        self._lock = threading.Lock()  # of those two
         self._unknown: set[str] = set()
         try:
             self._server = self._foxglove.start_server(
@@ -104,19 +106,25 @@ class FoxgloveNode:
 
     def on_subscribe(self, _client: Any, channel: Any) -> None:
         """Called by the server when somebody looks at a topic."""
-        if (topic := self._by_channel.get(channel.id)) is not None:
-            topic.look(1)
+        self._look(channel.id, 1)
 
     def on_unsubscribe(self, _client: Any, channel: Any) -> None:
         """Called by the server when somebody looks at a topic no more."""
-        if (topic := self._by_channel.get(channel.id)) is not None:
-            topic.look(-1)
+        self._look(channel.id, -1)
 
     def __getattr__(self, name: str) -> Any:
         """What else a client may ask for has no effect."""
         if name.startswith("on_"):
             return lambda *_: None
         raise AttributeError(name)
+
+    def _look(self, channel: int, change: int) -> None:
+        with self._lock:
+            topic = self._by_channel.get(channel)
+            if topic is None:
+                self._early[channel] = self._early.get(channel, 0) + change
+                return
+        topic.look(change)
 
     def _follow_topics(self) -> None:
         try:
@@ -138,7 +146,13 @@ class FoxgloveNode:
             definition = str(made._full_text).encode()  # noqa: SLF001 - genpy's only way to the whole definition
             schema = self._foxglove.Schema(name=kind, encoding="ros1msg", data=definition)
             topic = _Topic(name, self._foxglove.Channel(name, message_encoding="ros1", schema=schema))
-            self._topics[name] = self._by_channel[topic.channel.id()] = topic
+            self._topics[name] = topic
+            number = topic.channel.id()
+            with self._lock:
+                self._by_channel[number] = topic
+                early = self._early.pop(number, 0)
+            if early > 0:  # a viewer who is there already may answer before the channel has an entry
+                topic.look(early)
 
 
 def main() -> None:

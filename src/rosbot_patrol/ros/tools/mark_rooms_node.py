@@ -13,6 +13,7 @@ import argparse
 import logging
 import queue
 import sys
+import time
 from pathlib import Path
 from typing import NoReturn
 
@@ -37,6 +38,7 @@ from rosbot_patrol.ros.tools.markers_node import QUIET, room_markers
 log = logging.getLogger(__name__)
 
 REMIND_S = 5.0
+MAP_WITHIN_S = 60.0  # longest wait for the map: the exploration may have just begun
 FRAME = "map"
 
 
@@ -92,16 +94,12 @@ class MarkRooms:
         for room in self._marks.rooms:
             print(f"{room.title} at ({room.pose.x:.2f}, {room.pose.y:.2f})")
         self._show()
+        self._wait_for_the_map()
         self._say_what_next()
-        waited = 0.0
         while not rospy.is_shutdown() and not self._marks.is_full:
             try:
                 click = self._clicks.get(timeout=0.2)
             except queue.Empty:
-                waited += 0.2
-                if waited >= REMIND_S and self._map.get() is None:
-                    waited = 0.0
-                    log.warning("no map has been published on %s yet", rospy.resolve_name("map"))
                 continue
             if not self._take(click):
                 break
@@ -109,6 +107,17 @@ class MarkRooms:
             f"\n{count_of(len(self._marks.rooms), 'point')} in {self._path}; the launch takes them by"
             f" path_to_params:={self._path.resolve()}"
         )
+
+    def _wait_for_the_map(self) -> None:
+        """Wait for the map; clicks are kept meanwhile. Raises MapError after a minute without one."""
+        since = told = time.monotonic()
+        while self._map.get() is None and not rospy.is_shutdown():
+            if time.monotonic() - since > MAP_WITHIN_S:
+                raise MapError(rospy.resolve_name("map"), "nobody publishes a map: start the map server or gmapping")
+            if time.monotonic() - told > REMIND_S:
+                told = time.monotonic()
+                log.warning("no map has been published on %s yet", rospy.resolve_name("map"))
+            time.sleep(0.1)
 
     def _say_what_next(self) -> None:
         what = f"room {len(self._marks.rooms)}" if self._marks.rooms else "the base, where the robot waits"

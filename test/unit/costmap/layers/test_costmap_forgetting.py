@@ -230,3 +230,15 @@ def test_clearing_the_costmap_clears_the_ages():
     costmap.update(end + 1.0, HERE)
     assert lethal(costmap) == 0
     assert len(costmap.obstacle_layers[0]._marks) == 0
+
+
+def test_what_has_stood_is_kept_out_of_view_for_longer_than_what_passed_by():
+    costmap = make(forget_out_of_view_after=5.0, remember_standing=3.0)
+    end = stand(costmap, 0.0, 10.0, world(box=(2.5, 0.0, 0.3)))
+    behind = costmap.cells == 254
+    person = world(person=(1.0, 0.0, 0.4))  # hides the box
+    end = stand(costmap, end, 28.0, person)
+    assert (costmap.cells[behind] == 254).all()
+    stand(costmap, end, 4.0, person)
+    assert not (costmap.cells[behind] == 254).any()
+    assert lethal(costmap) > 0  # the person
