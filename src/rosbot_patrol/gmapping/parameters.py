@@ -55,6 +55,10 @@ class GmappingParams:
     llsamplestep: float = param(0.01, unit="m", doc="accepted, has no effect, as upstream")
     lasamplerange: float = param(0.005, unit="rad", doc="accepted, has no effect, as upstream")
     lasamplestep: float = param(0.005, unit="rad", doc="accepted, has no effect, as upstream")
+    loop_closure: bool = param(
+        False,
+        doc="whether loops are closed for good: all poses are corrected, the map is drawn anew; not upstream's",
+    )
     map_file: str = param("", doc="yaml of a saved map to extend; empty: start a new map")
     initial_pose_x: float = param(0.0, unit="m", doc="initial position on the saved map")
     initial_pose_y: float = param(0.0, unit="m", doc="initial position on the saved map")

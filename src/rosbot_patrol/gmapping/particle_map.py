@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +102,17 @@ class ParticleMaps:
             turn = np.array([[c, s], [-s, c]]) / self.resolution
             ends = beams.ends @ turn + (x, y)
             self.write(table, beams.sensor @ turn + (x, y), ends, beams.is_hit)
+
+    def draw_anew(self, poses: Array, scans: Iterable[Beams], saved: Grid | None = None) -> None:
+        """Replace all maps by one, drawn from scans at poses of shape (S, 3) [m, rad], on top of a saved one."""
+        count = self.count
+        self.tables = np.full((1, *self.tables.shape[1:]), -1, dtype=np.int32)
+        kernels.count_references(self.tables, self.refs, self.free)
+        if saved is not None:
+            self.seed(saved)
+        for pose, beams in zip(poses, scans, strict=True):
+            self.register(pose[None], beams)
+        self.select(np.zeros(count, dtype=np.int64))
 
     def write(self, table: NDArray[np.int32], start: Array, ends: Array, is_hit: NDArray[np.bool_]) -> None:
         """Write one scan into one map.

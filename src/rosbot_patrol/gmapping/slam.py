@@ -11,11 +11,12 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert, wrap_angle
+from rosbot_patrol.geometry import Pose2D, angle_difference, compose, compose_poses, invert, wrap_angle
 from rosbot_patrol.gmapping.beams import Beams, pick_beams
 from rosbot_patrol.gmapping.motion_model import move_deviation, move_poses
 from rosbot_patrol.gmapping.parameters import GmappingParams
@@ -24,6 +25,9 @@ from rosbot_patrol.gmapping.scan_matcher import ScanMatcher
 from rosbot_patrol.gmapping.trajectories import Trajectories
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.scan import LaserScan
+
+if TYPE_CHECKING:
+    from rosbot_patrol.gmapping.back_end.loop_closer import LoopCloser
 
 log = logging.getLogger(__name__)
 
@@ -74,7 +78,8 @@ class Slam:
         self.maps = ParticleMaps((p.xmin, p.ymin), (p.xmax, p.ymax), p.delta, p.particles)
         if saved is not None:
             self.maps.seed(saved)
-        self._has_map = saved is not None
+        self._saved = saved
+        self._closer = loop_closer(params)
         self._start = start
         self._matcher = ScanMatcher(params)
         self._trajectories = Trajectories()
@@ -142,10 +147,11 @@ class Slam:
         first = odometry if self._start is None else self._start
         self.poses = np.tile(np.array(first, dtype=np.float64), (self._params.particles, 1))
         self._odometry = self._updated_at = odometry
-        if self._has_map:
+        if self._saved is not None:
             return self._resume(stamp, odometry, beams)
         self.maps.register(self.poses, beams)
         self._trajectories.add(self.poses, np.arange(len(self.poses)))
+        self._close_loops(beams)
         self._note(stamp, odometry)
         return Outcome(updated=True, effective=float(len(self.poses)))
 
@@ -173,6 +179,7 @@ class Slam:
             self.poses = move_poses(guesses, Pose2D())
             self.poses += _in_map(noise * sigmas, headings)
             self._trajectories.add(self.poses, np.arange(len(self.poses)))
+            self._close_loops(beams)
             return Outcome(updated=True, is_blind=True)
         best = self.best
         found = self._matcher.match(self.maps, guesses, headings, beams, sigmas, best=best, noise=noise)
@@ -183,9 +190,22 @@ class Slam:
         parents, effective = self._resample_when_due()
         self.maps.register(self.poses, beams)
         self._trajectories.add(self.poses, parents)
+        self._close_loops(beams)
         failed = int(np.count_nonzero(found.scores <= self._params.minimumScore))
         resampled = effective < self._params.resampleThreshold * len(self.poses)
         return Outcome(updated=True, resampled=resampled, failed=failed, effective=effective, fit=fit)
+
+    def _close_loops(self, beams: Beams) -> None:
+        """Correct all poses if the last scan closes a loop, and draw one map for all particles."""
+        if self._closer is None:
+            return
+        before = self.trajectory
+        after = self._closer.add(before, beams)
+        if after is None:
+            return
+        self.poses = compose_poses(compose(Pose2D(*after[-1]), invert(Pose2D(*before[-1]))), self.poses)
+        self.maps.draw_anew(after, self._closer.scans, self._saved)
+        self._trajectories.restart(after[:-1], self.poses)
 
     def _resample_when_due(self) -> tuple[NDArray[np.int64], float]:
         """Index of each particle's parent, and the effective number of particles."""
@@ -229,6 +249,15 @@ class Slam:
         self._updated_at = compose(odometry, invert(last))
         self._updated_stamp = stamp
         self._correct()
+
+
+def loop_closer(params: GmappingParams) -> LoopCloser | None:
+    """The back end if it is wanted; only then it is loaded, because its solver needs memory."""
+    if not params.loop_closure:
+        return None
+    from rosbot_patrol.gmapping.back_end.loop_closer import LoopCloser
+
+    return LoopCloser(params.delta)
 
 
 def _in_map(errors: Array, headings: Array) -> Array:

@@ -29,6 +29,11 @@ class Trajectories:
         if len(self._poses) > TIDY:
             self._settle()
 
+    def restart(self, past: Array, poses: Array) -> None:
+        """Give all particles one past, shape (U - 1, 3), and their last poses, shape (N, 3)."""
+        self._settled, self._poses, self._parents = list(past), [], []
+        self.add(poses, np.zeros(len(poses), dtype=np.int64))
+
     def of(self, index: int) -> Array:
         """Trajectory of one particle: a pose for each update, shape (U, 3)."""
         way: list[Array] = []
