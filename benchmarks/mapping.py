@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """slam_gmapping: real robots' logs against their references, the house against its walls, speed and memory.
 
-    python3 benchmarks/mapping.py [--json FILE] [--only logs|house|nodes] [--seeds 5]
+    python3 benchmarks/mapping.py [--json FILE] [--only logs|house|moved|nodes] [--seeds 5]
         [--loop-closure] [--quick] [--datasets FOLDER] [--log FILE ...] [--pictures FOLDER] [--keep FILE] [--anew]
 
 The logs run with the tutorial's parameters (config/gmapping.yaml). Their odometry is made from the reference's
@@ -15,6 +15,9 @@ processor time of an update. `--loop-closure` runs all with the back end (`loop_
 In the house the robot drives at 0.3 m/s with 720 beams at 10 Hz (mapping_house.py). gmapping_update_ms is the median of
 the updates on one core. gmapping_rtf is the duration of the drive divided by the duration of the mapping. gmapping_mb
 is the program's peak memory.
+
+`--only moved` goes on with the house's map (`map_file`) after two pieces of furniture were moved. moved_left is the
+share of their old wall cells that the map still has.
 
 If the package path has the C++ original, the logs go by topics through it and through our node, one seed each
 (mapping_node.py). NAME_node_* are our errors and costs, NAME_original_* the original's: `ms` is the processor time of a
@@ -40,7 +43,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import yaml
-from mapping_house import measure_house
+from mapping_house import measure_house, measure_moved
 from node_cost import original, require_idle
 from numpy.typing import NDArray
 from right_angles import heading_errors
@@ -238,7 +241,7 @@ def show(figures: dict[str, float]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--only", choices=("logs", "house", "nodes"))
+    parser.add_argument("--only", choices=("logs", "house", "moved", "nodes"))
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--loop-closure", action="store_true", help="with the back end, as in exploring")
     parser.add_argument("--quick", action="store_true", help="one seed, one room")
@@ -255,6 +258,13 @@ def main() -> None:
         house, grid, found, true = measure_house(tutorial(1, loop_closure=options.loop_closure), quick=options.quick)
         figures |= house
         picture(grid, options.pictures, "house", found, true)
+    if options.only == "moved":
+        _, grid, found, true = measure_house(tutorial(1), quick=False)
+        with tempfile.TemporaryDirectory(prefix="mapping-moved-") as folder:
+            moved, again = measure_moved(tutorial(2), grid, Path(folder))
+        figures |= moved
+        picture(grid, options.pictures, "before", found, true)
+        picture(again, options.pictures, "after", found, true)
     if options.only in (None, "logs"):
         figures |= measure_logs(options)
     if options.only == "nodes" or (options.only is None and original("gmapping", "slam_gmapping")):

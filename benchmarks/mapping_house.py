@@ -6,9 +6,12 @@ with odometry errors as in the logs. The wall figures are from `map_truth.py`.
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import heapq
 import itertools
 import math
+import re
 import resource
 import statistics
 import time
@@ -24,9 +27,11 @@ from rosbot_patrol.amcl.scan_model.likelihood_field import Field, blocked_distan
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.gmapping.slam import Slam
+from rosbot_patrol.gmapping.start import started
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.distance_kernels import bounded_distances
-from rosbot_patrol.maps.occupancy import FREE
+from rosbot_patrol.maps.map_io import write_map
+from rosbot_patrol.maps.occupancy import FREE, OCCUPIED
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.replay.bags.carmen import noisy_odometry
 from rosbot_patrol.scan import LaserScan
@@ -38,6 +43,7 @@ SPEED, TURNING, RATE = 0.3, 0.8, 10.0
 CLEARANCE = 0.4  # m, smallest distance of the paths from walls
 BOUNDS = (-9.0, -4.0), (19.0, 17.0)
 WORLD = ROOT / "worlds" / "house.world"
+MOVED = {"coffee_table_7": (1.6, -0.2), "sofa_1": (-1.4, 0.37)}  # pieces of furniture and how far they are moved [m]
 
 Poses = NDArray[np.float64]
 
@@ -62,9 +68,9 @@ def way_between(clear: NDArray[np.bool_], start: tuple[int, int], goal: tuple[in
     return way[::-1]
 
 
-def waypoints(rooms: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def waypoints(rooms: list[tuple[float, float]], world: Path = WORLD) -> list[tuple[float, float]]:
     """Points of the path from room to room, one every 0.4 m."""
-    grid = plan(WORLD, BOUNDS, 0.1)
+    grid = plan(world, BOUNDS, 0.1)
     clear = bounded_distances(grid.cells != FREE, 10) * 0.1 > CLEARANCE
     points: list[tuple[float, float]] = []
     for start, goal in itertools.pairwise(rooms):
@@ -102,6 +108,45 @@ def scans(poses: Poses, field: Field, rng: np.random.Generator) -> Iterator[Lase
             range_max=REACH,
             ranges=np.where(seen, ranges + rng.normal(0.0, NOISE, BEAMS), np.inf),
         )
+
+
+def rearranged(folder: Path) -> Path:
+    """Write the world with the pieces of `MOVED` at other places."""
+    text = WORLD.read_text(encoding="utf-8")
+    for name, (dx, dy) in MOVED.items():
+        found = re.search(rf'<model name="{name}">.*?<pose>(\S+) (\S+) ', text, re.DOTALL)
+        assert found is not None, name
+        place = f"{float(found[1]) + dx:g} {float(found[2]) + dy:g}"
+        text = f"{text[: found.start(1)]}{place}{text[found.end(2) :]}"
+    path = folder / "rearranged.world"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def measure_moved(params: GmappingParams, saved: Grid, folder: Path) -> tuple[dict[str, float], Grid]:
+    """The saved map gone on with after `MOVED`: what is left of the old places, what is found at the new ones."""
+    world = rearranged(folder)
+    with contextlib.chdir(folder):
+        write_map("saved", saved)
+    rooms = [(room.pose.x, room.pose.y) for room in load_rooms(ROOT / "params" / "room_points.yaml")]
+    poses = drive(waypoints([rooms[0], *rooms[1:], rooms[0]], world))
+    field = blocked_distances(plan(world, BOUNDS, 0.02), 3.0)
+    odometry = noisy_odometry(poses, np.random.default_rng(3))
+    slam = started(dataclasses.replace(params, map_file=str(folder / "saved.yaml")))
+    for scan, row in zip(scans(poses, field, np.random.default_rng(4)), odometry, strict=True):
+        slam.update(scan, Pose2D(*row), MOUNT)
+    found = slam.grid()
+    cell = found.info.resolution
+    old, new = (plan(which, BOUNDS, cell) for which in (WORLD, world))
+    steps = [round((a - b) / cell) for a, b in zip(BOUNDS[0], (found.info.origin_x, found.info.origin_y), strict=True)]
+    now = found.cells[steps[1] : steps[1] + old.info.height, steps[0] : steps[0] + old.info.width]
+    was = bounded_distances(saved.cells == OCCUPIED, 10)
+    shift = [round((a - b) / cell) for a, b in zip(BOUNDS[0], (saved.info.origin_x, saved.info.origin_y), strict=True)]
+    had = was[shift[1] : shift[1] + old.info.height, shift[0] : shift[0] + old.info.width] < 0.5
+    gone = had & (old.cells == OCCUPIED) & (new.cells == FREE) & (bounded_distances(new.cells == OCCUPIED, 10) > 2.0)
+    figures = {"moved_left": float(np.mean(now[gone] == OCCUPIED)), "moved_cells": float(gone.sum())}
+    walls = map_figures(found, world, BOUNDS)
+    return {**figures, "moved_wall_f1": round(walls.f1, 4), "moved_wall_error_m": round(walls.error_m, 4)}, found
 
 
 def wall_figures(found: Grid) -> dict[str, float]:

@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 PATCH = 32  # cells: upstream rounds the initial extent down to a multiple of this
 MARGIN = 10.0  # m by which a map grows
 GROWTH = 1.25
-SEED_BEAMS = 20  # number of beams that a cell of a saved map stands for
+SEED_BEAMS = 5  # number of beams that a cell of a saved map stands for
+RECENT = 100  # beams of a cell that count on a saved map: what moved since is forgotten where the lidar looks through
 
 
 class ParticleMaps:
@@ -52,6 +53,7 @@ class ParticleMaps:
         self.refs = np.zeros(0, dtype=np.int32)
         self.free = np.zeros(1, dtype=np.int32)
         self._scans = 0  # number of the last scan, 1 to 65535
+        self._most = FULL  # beams of a cell at which its counts are halved
 
     @property
     def count(self) -> int:
@@ -125,10 +127,10 @@ class ParticleMaps:
         """
         arrays = (table, self.cells, self.refs, self.free)
         done, stamp = 0, self._scans
-        while (done := kernels.register_hits(*arrays, ends, is_hit, stamp, done)) < len(ends):
+        while (done := kernels.register_hits(*arrays, ends, is_hit, stamp, done, self._most)) < len(ends):
             self._grow(0)
         done = 0
-        while (done := kernels.register_rays(*arrays, start, ends, stamp, done)) < len(ends):
+        while (done := kernels.register_rays(*arrays, start, ends, stamp, done, self._most)) < len(ends):
             self._grow(int(np.abs(ends - start).sum(axis=1).max()) // TILE + 4)
 
     def _grow(self, least: int) -> None:
@@ -184,6 +186,7 @@ class ParticleMaps:
             MapError: it is turned, or its cells are of another size.
         """
         grid.info.require_aligned("slam_gmapping")
+        self._most = RECENT
         if abs(grid.info.resolution / self.resolution - 1.0) > 1e-3:
             raise MapError("map", f"its cells are {grid.info.resolution} m, expected delta, {self.resolution} m")
         edge = TILE * self.resolution

@@ -89,10 +89,10 @@ def _count_hit(cells: Cells, tile: int, cell: int, x: float, y: float) -> None:
 
 
 @kernel()
-def _count_visit(cells: Cells, tile: int, cell: int) -> None:
-    """Count a beam; both counts are halved before they overflow."""
+def _count_visit(cells: Cells, tile: int, cell: int, most: int) -> None:
+    """Count a beam; both counts are halved at `most`, so that older beams count less."""
     visits = int(cells[tile, cell, VISITS])
-    if visits >= FULL:
+    if visits >= most:
         visits >>= 1
         cells[tile, cell, HITS] = int(cells[tile, cell, HITS]) >> 1
     cells[tile, cell, VISITS] = visits + 1
@@ -100,7 +100,10 @@ def _count_visit(cells: Cells, tile: int, cell: int) -> None:
         _tell_wall(cells, tile, cell)
 
 
-@kernel("int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[:, ::1], boolean[::1], int64, int64)")
+@kernel(
+    "int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[:, ::1], boolean[::1], int64, int64,"
+    " int64)"
+)
 def register_hits(
     table: Table,
     cells: Cells,
@@ -110,6 +113,7 @@ def register_hits(
     is_hit: NDArray[np.bool_],
     stamp: int,
     first: int,
+    most: int,
 ) -> int:
     """Write the ends of a scan's beams into a map.
 
@@ -122,6 +126,7 @@ def register_hits(
         is_hit: whether a beam hit something there, or was only cut there, shape (K,).
         stamp: number of the scan, 1 to 65535.
         first: index of the first beam to write.
+        most: number of beams of a cell at which its counts are halved, up to 65535.
 
     Returns:
         Index of the beam before which the unused tiles might run out, K if all are written.
@@ -133,15 +138,18 @@ def register_hits(
             ix, iy = math.floor(ends[k, 0]), math.floor(ends[k, 1])
             tile = own_tile(table, cells, refs, free, iy >> BITS, ix >> BITS)
             cell = ((iy & MASK) << BITS) + (ix & MASK)
-            _count_visit(cells, tile, cell)
+            _count_visit(cells, tile, cell, most)
             _count_hit(cells, tile, cell, ends[k, 0] - ix, ends[k, 1] - iy)
             cells[tile, cell, STAMP] = stamp
     return ends.shape[0]
 
 
-@kernel("int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[::1], float64[:, ::1], int64, int64)")
+@kernel(
+    "int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[::1], float64[:, ::1], int64, int64,"
+    " int64)"
+)
 def register_rays(
-    table: Table, cells: Cells, refs: Table, free: Table, start: Array, ends: Array, stamp: int, first: int
+    table: Table, cells: Cells, refs: Table, free: Table, start: Array, ends: Array, stamp: int, first: int, most: int
 ) -> int:
     """Count a visit for each cell that a beam crosses before its end.
 
@@ -156,6 +164,7 @@ def register_rays(
         ends: of the beams, shape (K, 2).
         stamp: number of the scan, 1 to 65535.
         first: index of the first beam to write.
+        most: number of beams of a cell at which its counts are halved, up to 65535.
 
     Returns:
         Index of the beam before which the unused tiles might run out, K if all are written.
@@ -186,7 +195,7 @@ def register_rays(
                 owned[ty - low_ty, tx - low_tx] = tile
             cell = ((iy & MASK) << BITS) + (ix & MASK)
             if cells[tile, cell, STAMP] != stamp:
-                _count_visit(cells, tile, cell)
+                _count_visit(cells, tile, cell, most)
             if next_x < next_y:
                 next_x += each_x
                 ix += step_x

@@ -236,3 +236,27 @@ def test_a_long_past_is_kept_once() -> None:
             wanted.append(poses[at])
             at = parents[at]
         assert (made.of(index) == np.array(wanted[::-1])).all()
+
+
+def test_what_moved_since_the_saved_map_is_forgotten_and_drawn_where_it_is() -> None:
+    box, walls = ROOM[-4:], ROOM[:-4]
+    first = Slam(small())
+    driven(first)
+    saved = first.grid()
+    moved = np.vstack((walls, box + np.array([4.5, 0.5, 4.5, 0.5])))
+    slam = Slam(small(), saved=saved, start=WAY[0])
+    for i, (pose, odometry) in enumerate(zip(WAY, odometry_of(WAY), strict=True)):
+        slam.update(scan_at(pose, stamp=0.1 * i, beams=360, walls=moved), odometry, Pose2D())
+    occupied = slam.grid().cells == 100
+
+    def share(lines: np.ndarray) -> float:
+        """Share of points on walls with an occupied cell at most one cell away."""
+        shares = np.linspace(0.0, 1.0, 60)[:, None, None]
+        points = (lines[None, :, :2] * (1.0 - shares) + lines[None, :, 2:] * shares).reshape(-1, 2)
+        cells = [slam.grid().info.cell_of(x, y) for x, y in points]
+        return float(np.mean([occupied[iy - 1 : iy + 2, ix - 1 : ix + 2].any() for ix, iy in cells]))
+
+    seen = [box[1], box[2]]  # the sides that the robot saw: the right one and the upper one
+    assert share(np.array(seen)) < 0.1
+    assert share(moved[-4:][[2, 3]]) > 0.9
+    assert share(walls) > 0.9

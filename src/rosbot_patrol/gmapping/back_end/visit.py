@@ -85,6 +85,6 @@ class Visit:
         variance = max(squares / fitting, NARROWEST)
         information /= variance * max(1.0, len(hits) / INDEPENDENT)
         metres = np.array([self._maps.resolution, self._maps.resolution, 1.0])
-        covariance = np.linalg.inv(information + np.diag(TUNING[3:])) * np.outer(metres, metres)
+        covariance = np.linalg.inv(information + np.diag(TUNING[3:])) * metres[:, None] * metres
         x, y, yaw = self._maps.from_cells(pose[None])[0]
         return Place(Pose2D(x, y, yaw), covariance)
