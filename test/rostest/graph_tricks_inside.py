@@ -22,6 +22,9 @@ SENSOR = (
 ROUNDS = [
     {
         "a second publisher of /cmd_vel": "topic /cmd_vel has 2 publishers",
+        "a second camera": "topic /camera/rgb/image_raw has 2 publishers",
+        "a service on another machine": "node /butler runs on 10.77.0.2",
+        "the clock of all nodes": "every node would start with other settings",
         "a publisher on another machine": "node /thief runs on 10.77.0.2",
         "a listener on another machine": "node /spy runs on 10.77.0.2",
         "the camera is signed off": "the camera has gone",

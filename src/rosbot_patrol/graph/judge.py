@@ -23,6 +23,7 @@ class Fault(Enum):
 
     MASTER_GONE = "master_gone"
     SECOND_DRIVER = "second_driver"
+    SECOND_WITNESS = "second_witness"
     STRANGE_NODE = "strange_node"
     LINK_GONE = "link_gone"
     SETTINGS_CHANGED = "settings_changed"
@@ -50,11 +51,13 @@ class Expected:
 
     Attributes:
         driven: topic on which one node alone drives the robot.
+        witnessed: topics on which one node alone tells what the guard sees, with a name for people.
         published, subscribed: topics that need a publisher or a subscriber, with a name for people.
         is_known_host: whether nodes of a host belong to the guard.
     """
 
     driven: str
+    witnessed: Mapping[str, str]
     published: Mapping[str, str]
     subscribed: Mapping[str, str]
     is_known_host: Callable[[str], bool]
@@ -104,6 +107,11 @@ class Judge:
         if len(drivers) > 1:
             what = f"has {len(drivers)} publishers where one alone may drive the robot: {', '.join(drivers[:5])}"
             yield Finding(fault=Fault.SECOND_DRIVER, subject=f"topic {self.expected.driven}", what=what)
+        for topic, name in self.expected.witnessed.items():
+            witnesses = sorted(graph.publishers.get(topic, ()))
+            if len(witnesses) > 1:
+                what = f"has {len(witnesses)} publishers where {name} alone may speak: {', '.join(witnesses[:5])}"
+                yield Finding(fault=Fault.SECOND_WITNESS, subject=f"topic {topic}", what=what)
 
     def _strangers(self, graph: Snapshot) -> Iterable[Finding]:
         for node, uri in sorted(graph.uris.items()):
@@ -132,13 +140,13 @@ class Judge:
                     yield Finding(fault=Fault.LINK_GONE, subject=name, what=what)
 
     def _settings(self, parameters: Mapping[str, Mapping[str, str]]) -> Iterable[Finding]:
-        for node, now in sorted(parameters.items()):
-            first = self._first.setdefault(node, dict(now))
+        for whose, now in sorted(parameters.items()):
+            first = self._first.setdefault(whose, dict(now))
             changed = sorted(name for name in first.keys() | now.keys() if first.get(name) != now.get(name))
             if changed:
                 more = f" and {len(changed) - 5} more" if len(changed) > 5 else ""
                 what = f"would start with other settings than before: {', '.join(changed[:5])}{more} changed"
-                yield Finding(fault=Fault.SETTINGS_CHANGED, subject=f"node {node}", what=what)
+                yield Finding(fault=Fault.SETTINGS_CHANGED, subject=whose, what=what)
 
 
 def _master(what: str) -> Finding:

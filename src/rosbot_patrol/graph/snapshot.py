@@ -17,7 +17,8 @@ class Snapshot:
     Attributes:
         publishers, subscribers: nodes by topic.
         uris: address of each node, as http://HOST:PORT/.
-        parameters: digest of each watched node's parameters, by node; None: not asked this time.
+        parameters: digest of each watched parameter, by whose they are, for people: "node /x"; None: not asked this
+            time.
         listening: TCP ports of this machine that others can reach; None: not asked this time.
         master_port: TCP port of the master; run_id: its mark since its start.
     """

@@ -14,6 +14,7 @@ class Kind(Enum):
     PATROL_GONE = "patrol_gone"
     MASTER_GONE = Fault.MASTER_GONE.value
     SECOND_DRIVER = Fault.SECOND_DRIVER.value
+    SECOND_WITNESS = Fault.SECOND_WITNESS.value
     STRANGE_NODE = Fault.STRANGE_NODE.value
     LINK_GONE = Fault.LINK_GONE.value
     SETTINGS_CHANGED = Fault.SETTINGS_CHANGED.value
@@ -29,7 +30,16 @@ class Kind(Enum):
     CLOCK_OFF = "clock_off"
 
 
-OF_GRAPH = frozenset({Kind.MASTER_GONE, Kind.SECOND_DRIVER, Kind.STRANGE_NODE, Kind.LINK_GONE, Kind.SETTINGS_CHANGED})
+OF_GRAPH = frozenset(
+    {
+        Kind.MASTER_GONE,
+        Kind.SECOND_DRIVER,
+        Kind.SECOND_WITNESS,
+        Kind.STRANGE_NODE,
+        Kind.LINK_GONE,
+        Kind.SETTINGS_CHANGED,
+    }
+)
 SERIOUS = OF_GRAPH | {Kind.PATROL_GONE, Kind.SILENT, Kind.BRIDGE_GONE, Kind.DUPLICATE_ID, Kind.WRONG_PEER}
 
 

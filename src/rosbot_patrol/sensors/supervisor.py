@@ -36,6 +36,7 @@ _DELAYS: dict[Kind, tuple[float, float]] = {
     Kind.PATROL_GONE: (0.0, 3.0),
     Kind.MASTER_GONE: (0.0, 5.0),  # has its own time
     Kind.SECOND_DRIVER: (3.0, 10.0),
+    Kind.SECOND_WITNESS: (3.0, 10.0),
     Kind.STRANGE_NODE: (0.0, 10.0),
     Kind.LINK_GONE: (0.0, 5.0),  # has its own time
     Kind.SETTINGS_CHANGED: (0.0, 0.0),

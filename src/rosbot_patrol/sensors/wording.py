@@ -15,6 +15,7 @@ _ONE_IS: dict[Kind, str] = {
     Kind.PATROL_GONE: "has gone, or hangs",
     Kind.MASTER_GONE: "has gone, or was started anew",
     Kind.SECOND_DRIVER: "has a second publisher",
+    Kind.SECOND_WITNESS: "has a second publisher",
     Kind.STRANGE_NODE: "runs on a machine that the guard does not know",
     Kind.LINK_GONE: "has gone",
     Kind.SETTINGS_CHANGED: "has other settings than at its start",
@@ -37,6 +38,9 @@ _TO_DO: dict[Kind, str] = {
     Kind.SECOND_DRIVER: "where you drive with a program of your own, end it. Otherwise somebody in your network drives"
     " the robot: press the emergency stop, take the robot off the network, and close the graph with scripts/secure"
     " (docs/security.md).",
+    Kind.SECOND_WITNESS: "where you play a record or try a program of your own, end it. Otherwise somebody in your"
+    " network tells the guard what it sees, and may hide an intruder: take the robot off the network, and close the"
+    " graph with scripts/secure (docs/security.md).",
     Kind.STRANGE_NODE: "if the machine is yours, name it in graph_hosts. Otherwise somebody in your network is in the"
     " guard's graph and can command it: take the robot off the network, and close the graph with scripts/secure"
     " (docs/security.md).",
@@ -158,6 +162,7 @@ def short(kinds: Sequence[Kind]) -> str:
         Kind.PATROL_GONE: "it was gone",
         Kind.MASTER_GONE: "it was gone",
         Kind.SECOND_DRIVER: "it had a second publisher",
+        Kind.SECOND_WITNESS: "it had a second publisher",
         Kind.STRANGE_NODE: "it was there",
         Kind.LINK_GONE: "it was gone",
         Kind.SETTINGS_CHANGED: "it had other settings",

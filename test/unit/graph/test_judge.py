@@ -12,6 +12,7 @@ from rosbot_patrol.graph.snapshot import Snapshot, digests
 MINE = "http://localhost:40001/"
 EXPECTED = Expected(
     driven="/cmd_vel",
+    witnessed={"/camera": "the camera"},
     published={"/camera": "the camera"},
     subscribed={"/motion_trigger": "the patrol's ear"},
     is_known_host=lambda host: host == "localhost",
@@ -41,6 +42,13 @@ def test_a_second_driver_is_named(judge: Judge) -> None:
     (found,) = judge.look(graph(publishers={"/cmd_vel": frozenset({"/twist_mux", "/thief"})}), 0.0)
     assert found.fault is Fault.SECOND_DRIVER
     assert "/thief, /twist_mux" in found.what
+
+
+def test_a_second_camera_is_named(judge: Judge) -> None:
+    publishers = {"/cmd_vel": frozenset({"/twist_mux"}), "/camera": frozenset({"/usb_cam", "/liar"})}
+    (found,) = judge.look(graph(publishers=publishers), 0.0)
+    assert (found.fault, found.subject) == (Fault.SECOND_WITNESS, "topic /camera")
+    assert found.what == "has 2 publishers where the camera alone may speak: /liar, /usb_cam"
 
 
 def test_a_node_of_a_strange_machine(judge: Judge) -> None:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import Pose2D, compose, invert, transform_points
+from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.gmapping.back_end.kept_scans import KeptScans
 from rosbot_patrol.gmapping.back_end.pose_graph import (
     INLIER,
@@ -35,7 +35,7 @@ BEHIND = 2.0  # way of the last scans that are searched together [m]
 VISITS = 2  # earlier visits that are tried at each place
 DRIFT, DRIFT_TURN = 0.08, 0.015  # by which a pose may be off after each metre without a loop [m, rad] ...
 REACH, REACH_TURN = (0.5, 5.0), (0.12, 0.6)  # ... from and up to these [m, rad]
-MAP_ERROR = (0.015, 0.015, 0.004)  # of the small map itself [m, m, rad]
+MAP_ERROR = (0.03, 0.03, 0.008)  # of a search: of the small map, and of scans that several searches share [m, m, rad]
 STEP_ERROR = (0.003, 0.003, 0.001)  # of the front end from update to update [m, m, rad] ...
 WAY_ERROR = (0.02, 0.02, 0.005)  # ... and on a metre, likewise
 EXPECTED = 3.0  # squared Mahalanobis length up to which a loop says what the poses say already
@@ -104,13 +104,14 @@ class LoopCloser:
         self._solved_at = float(ways[-1])
         if found.weights[-new:].max() > 0.5:
             self._closed = len(poses) - 1
-        changes = np.abs(found.poses - poses)
+        better = aligned(found.poses, poses)
+        changes = np.abs(better - poses)
         amount = max(float(np.hypot(*changes[:, :2].T).max()) / SHIFT, float(changes[:, 2].max()) / SHIFT_TURN)
         if amount < 1.0 or (amount < AT_ONCE and ways[-1] - self._corrected_at < _pause(ways)):
             return None
         self._corrected_at = float(ways[-1])
         self._steps = steps
-        return found.poses
+        return better
 
     def _search(self, poses: Array, ways: Array) -> Relations:
         """Look for the last pose on earlier ways."""
@@ -119,10 +120,15 @@ class LoopCloser:
         reach = float(np.clip(DRIFT * alone, *REACH))
         turn = float(np.clip(DRIFT_TURN * alone, *REACH_TURN))
         anchors = self._anchors(poses, ways, NEAR + reach)
-        hits = self._last_hits(poses, ways) if anchors else np.empty((0, 6))
-        for anchor in anchors if len(hits) else []:
-            relation = self._match(poses, ways, anchor, hits, (reach, turn))
-            if relation is not None:
+        last = self._visit(poses, ways, len(poses) - 1, BEHIND)
+        for anchor in anchors:
+            earlier = self._visit(poses, ways, anchor, AROUND)
+            guess = relative_moves(poses, np.array([anchor]), np.array([len(poses) - 1]))[0]
+            place = earlier.find(last, Pose2D(*guess), reach, turn)
+            if place is not None:
+                pair = np.array([anchor]), np.array([len(poses) - 1])
+                covariance = place.covariance + np.diag(np.square(MAP_ERROR))
+                relation = Relations(*pair, np.array([place.pose]), np.linalg.inv(covariance)[None])
                 found = found.joined(relation)
         return found
 
@@ -136,35 +142,27 @@ class LoopCloser:
         nearest = [int(visit[np.argmin(gaps[visit])]) for visit in visits]
         return sorted(nearest, key=lambda index: float(gaps[index]))[:VISITS]
 
-    def _last_hits(self, poses: Array, ways: Array) -> Array:
-        """Hits of the last scans together in the frame of the last pose [cells], shape (H, 6)."""
-        first = int(np.searchsorted(ways, ways[-1] - BEHIND))
-        parts = []
-        for index in range(first, len(poses)):
-            hits = self.scans[index].hits
-            move = compose(invert(Pose2D(*poses[-1])), Pose2D(*poses[index]))
-            turned = [transform_points(Pose2D(0.0, 0.0, move.yaw), hits[:, k : k + 2]) for k in (2, 4)]
-            parts.append(np.hstack((transform_points(move, hits[:, :2]) / self._resolution, *turned)))
-        return np.ascontiguousarray(np.concatenate(parts))
-
-    def _match(
-        self, poses: Array, ways: Array, anchor: int, hits: Array, around: tuple[float, float]
-    ) -> Relations | None:
-        """The relation of an earlier pose to the last one, None if its surroundings are not seen again."""
-        first = int(np.searchsorted(ways, ways[anchor] - AROUND))
-        end = int(np.searchsorted(ways, ways[anchor] + AROUND, side="right"))
-        visit = Visit(self.scans, poses, range(first, end), self._resolution)
-        place = visit.find(hits, Pose2D(*poses[-1]), *around)
-        if place is None:
-            return None
-        c, s = math.cos(poses[anchor, 2]), math.sin(poses[anchor, 2])
-        into = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        covariance = into @ place.covariance @ into.T + np.diag(np.square(MAP_ERROR))
-        move = compose(invert(Pose2D(*poses[anchor])), place.pose)
-        pair = np.array([anchor]), np.array([len(poses) - 1])
-        return Relations(*pair, np.array([move]), np.linalg.inv(covariance)[None])
+    def _visit(self, poses: Array, ways: Array, anchor: int, around: float) -> Visit:
+        """What was seen up to `around` metres of way before and after an update."""
+        first = int(np.searchsorted(ways, ways[anchor] - around))
+        end = int(np.searchsorted(ways, ways[anchor] + around, side="right"))
+        return Visit(self.scans, poses, range(first, end), anchor, self._resolution)
 
 
 def _pause(ways: Array) -> float:
     """Way from correction to correction [m]."""
     return max(PAUSE, SHARE * float(ways[-1]))
+
+
+def aligned(poses: Array, others: Array) -> Array:
+    """Poses moved as a whole so that their places lie as near to the others as possible, shape (N, 3).
+
+    Least squares (Umeyama: Least-squares estimation of transformation parameters between two point patterns, 1991).
+    """
+    centre, other = poses[:, :2].mean(axis=0), others[:, :2].mean(axis=0)
+    a, b = poses[:, :2] - centre, others[:, :2] - other
+    turn = math.atan2(float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])), float(np.sum(a * b)))
+    out = np.empty_like(poses)
+    out[:, :2] = transform_points(Pose2D(0.0, 0.0, turn), a) + other
+    out[:, 2] = poses[:, 2] + turn
+    return out

@@ -39,13 +39,14 @@ class WallField:
         fill_pyramid(self._levels)
         self._corner = np.asarray(origin, dtype=np.float64) - pad
 
-    def find(self, points: Array, guess: Pose2D, turn: float) -> Array | None:
+    def find(self, points: Array, guess: Pose2D, turn: float, *, least: float = LEAST_SHARE) -> Array | None:
         """Find the best pose within the reach and up to `turn` [rad] from a guess.
 
         Args:
             points: in the robot's frame [cells], shape (P, 2).
             guess: where the robot may be [cells, rad].
             turn: largest turn from it [rad].
+            least: share of the highest possible sum below which no place is found.
 
         Returns:
             The pose, shape (3,); None if nowhere is good enough.
@@ -58,8 +59,8 @@ class WallField:
         turns = np.arange(-count, count + 1) * (turn / count)
         placed = np.stack([transform_points(Pose2D(guess.x, guess.y, guess.yaw + t), points) for t in turns])
         best = np.empty(4, dtype=np.int64)
-        least = int(LEAST_SHARE * 255 * len(points))
-        find_best(self._levels, np.floor(placed - self._corner).astype(np.int32), self._reach, least, best)
+        lowest = int(least * 255 * len(points))
+        find_best(self._levels, np.floor(placed - self._corner).astype(np.int32), self._reach, lowest, best)
         if best[0] < 0:
             return None
         return np.array([guess.x + best[1], guess.y + best[2], guess.yaw + turns[best[0]]])

@@ -33,6 +33,7 @@ _PUBLISHED = {
     "darknet_ros/bounding_boxes": "the detector",
     "motion_trigger": "the bridge of the motion sensors",
 }
+_WITNESSED = ("camera/rgb/image_raw", "scan", "odom", "darknet_ros/bounding_boxes")
 _CALLS, _ALIVE, _DRIVEN = "motion_trigger", "patrol/alive", "cmd_vel"
 # nodes with parameters that stay as they are while the node runs; for each node, the parameters that it sets itself
 _STEADY: dict[str, frozenset[str]] = {
@@ -118,6 +119,7 @@ class GraphReader:
         self._judge = Judge(
             Expected(
                 driven=rospy.resolve_name(_DRIVEN),
+                witnessed={rospy.resolve_name(topic): _PUBLISHED[topic] for topic in _WITNESSED},
                 published={rospy.resolve_name(topic): name for topic, name in _PUBLISHED.items()},
                 subscribed={rospy.resolve_name(_CALLS): "the patrol's ear for motion sensors"},
                 is_known_host=KnownHosts(params.graph_hosts),
@@ -182,8 +184,15 @@ class GraphReader:
             node = rospy.resolve_name(name)
             if node in self._uris or node in self._seen:  # while it starts again, too
                 self._seen.add(node)
-                found[node] = digests(self._tree(node), own)
+                found[f"node {node}"] = digests(self._tree(node), own)
+        found["every node"] = digests({"use_sim_time": self._is_simulated()})
         return found
+
+    def _is_simulated(self) -> bool:
+        try:
+            return bool(self._master.getParam("/use_sim_time"))
+        except rosgraph.MasterError:  # as good as false
+            return False
 
     def _tree(self, node: str) -> dict[str, Any]:
         try:

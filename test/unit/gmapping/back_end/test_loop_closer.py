@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from mapped_room import scan_at, small
 
-from rosbot_patrol.geometry import Pose2D, compose, invert
+from rosbot_patrol.geometry import Pose2D, compose, compose_poses, invert
 from rosbot_patrol.gmapping.back_end.kept_scans import KeptScans
-from rosbot_patrol.gmapping.back_end.loop_closer import LoopCloser
+from rosbot_patrol.gmapping.back_end.loop_closer import LoopCloser, aligned
 from rosbot_patrol.gmapping.back_end.pose_graph import relative_moves
 from rosbot_patrol.gmapping.back_end.visit import Visit
 from rosbot_patrol.gmapping.beams import pick_beams
@@ -116,15 +116,19 @@ def test_scans_are_kept_as_they_were() -> None:
 
 
 def test_what_a_visit_did_not_see_is_not_found_in_it() -> None:
-    kept, pose = KeptScans(), Pose2D(-5.0, -5.0, 0.0)
-    kept.add(beams_at(pose))
-    visit = Visit(kept, np.array([pose]), range(1), 0.05)
-    hits = kept[0].hits
-    hits[:, :2] /= 0.05
-    found = visit.find(hits, Pose2D(-4.8, -5.2, 0.05), 0.5, 0.1)
+    kept, poses = KeptScans(), np.array([(-5.0, -5.0, 0.0), (-4.8, -5.1, 0.1), (5.0, 5.0, 2.0)])
+    for pose in poses:
+        kept.add(beams_at(Pose2D(*pose)))
+    visit, near, elsewhere = (Visit(kept, poses, range(i, i + 1), i, 0.05) for i in range(3))
+    found = visit.find(near, Pose2D(0.4, 0.1, 0.05), 0.5, 0.1)
     assert found is not None
-    assert found.pose == pytest.approx(pose, abs=0.01)
+    assert found.pose == pytest.approx((0.2, -0.1, 0.1), abs=0.015)
     assert np.linalg.eigvalsh(found.covariance).min() > 0.0
-    other = beams_at(Pose2D(5.0, 5.0, 2.0)).hits
-    other[:, :2] /= 0.05
-    assert visit.find(other, Pose2D(-4.8, -5.2, 0.05), 0.5, 0.1) is None
+    assert visit.find(elsewhere, Pose2D(), 0.5, 0.1) is None
+
+
+def test_a_solution_is_laid_onto_the_poses_as_they_were() -> None:
+    poses = np.array(rounds(20.0))
+    moved = compose_poses(Pose2D(3.0, -2.0, 0.5), poses)
+    assert aligned(moved, poses)[:, :2] == pytest.approx(poses[:, :2])
+    assert np.cos(aligned(moved, poses)[:, 2] - poses[:, 2]) == pytest.approx(1.0)
