@@ -97,3 +97,16 @@ def test_a_stranger_commands_an_open_graph_and_gets_nowhere_with_a_closed_one(ho
 def public_key(host):
     private = host.run("cat", "/etc/rosbot_patrol/wireguard.key").strip()
     return subprocess.run(["wg", "pubkey"], input=private, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_husarnet_is_taken_where_it_is(hosts):
+    assert hosts  # they have made the switch
+    robot = Host("abroad", 5)
+    hosts["abroad"] = robot
+    for words in (("add", "hnet0", "type", "veth", "peer", "name", "hnet1"), ("set", "hnet0", "up")):
+        robot.run("ip", "link", *words)
+    assert "Husarnet is there" in robot.run("scripts/secure", "robot")
+    assert '"hnet0"' in robot.run("nft", "list", "ruleset")
+    assert "patrol0" not in robot.run("ip", "link")
+    robot.run("scripts/secure", "remove")
+    assert "hnet0" not in robot.run("nft", "list", "ruleset")

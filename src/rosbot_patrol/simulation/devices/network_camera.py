@@ -72,11 +72,12 @@ class NetworkCamera:
         elif request.path == "/stream":
             self._stream(request)
         elif request.path == "/capture":
+            jpeg = self._jpeg  # once: the next picture may come before the end of this answer
             request.send_response(HTTPStatus.OK)
             request.send_header("Content-Type", "image/jpeg")
-            request.send_header("Content-Length", str(len(self._jpeg)))
+            request.send_header("Content-Length", str(len(jpeg)))
             request.end_headers()
-            request.wfile.write(self._jpeg)
+            request.wfile.write(jpeg)
         else:
             request.send_error(HTTPStatus.NOT_FOUND)
 
