@@ -39,7 +39,7 @@ MAP_ERROR = (0.03, 0.03, 0.008)  # of a search: of the small map, and of scans t
 STEP_ERROR = (0.003, 0.003, 0.001)  # of the front end from update to update [m, m, rad] ...
 WAY_ERROR = (0.02, 0.02, 0.005)  # ... and on a metre, likewise
 EXPECTED = 3.0  # squared Mahalanobis length up to which a loop says what the poses say already
-SHIFT, SHIFT_TURN = 0.03, 0.008  # changes of poses that are worth a new map [m, rad] ...
+SHIFT, SHIFT_TURN = 0.06, 0.02  # by so much less a relation is off where a new map is worth it [m, rad] ...
 PAUSE, SHARE = 5.0, 0.05  # ... after this way [m] or share of the whole way, because a long one takes long to draw
 AT_ONCE = 10.0  # changes so many times as large are worth it at once
 
@@ -104,14 +104,15 @@ class LoopCloser:
         self._solved_at = float(ways[-1])
         if found.weights[-new:].max() > 0.5:
             self._closed = len(poses) - 1
-        better = aligned(found.poses, poses)
-        changes = np.abs(better - poses)
-        amount = max(float(np.hypot(*changes[:, :2].T).max()) / SHIFT, float(changes[:, 2].max()) / SHIFT_TURN)
+        is_believed = found.weights > 0.5
+        off = [np.abs(errors_of(each, self.loops)[is_believed]) for each in (poses, found.poses)]
+        gains = np.hypot(*off[0][:, :2].T) - np.hypot(*off[1][:, :2].T), off[0][:, 2] - off[1][:, 2]
+        amount = max(gains[0].max(initial=0.0) / SHIFT, gains[1].max(initial=0.0) / SHIFT_TURN)
         if amount < 1.0 or (amount < AT_ONCE and ways[-1] - self._corrected_at < _pause(ways)):
             return None
         self._corrected_at = float(ways[-1])
         self._steps = steps
-        return better
+        return aligned(found.poses, poses)
 
     def _search(self, poses: Array, ways: Array) -> Relations:
         """Look for the last pose on earlier ways."""
