@@ -183,6 +183,7 @@ def test_a_guest_orders_nothing_and_sees_nothing_live(house, console):
     page.see("Only owners change the house.")
 
 
+@pytest.mark.long
 def test_a_patrol_that_dies_and_comes_back(house, console):
     house.start_move_base()
     house.start_patrol()

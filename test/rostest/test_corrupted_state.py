@@ -170,6 +170,7 @@ def play(house, seeds: Iterable[int]) -> list[Outcome]:
     return outcomes
 
 
+@pytest.mark.long
 def test_a_damaged_state_folder_is_told_and_the_guard_guards(house):
     outcomes = play(house, range(3))
     assert not [each for each in outcomes if each.problem]

@@ -46,6 +46,7 @@ def tap(page, share_x, share_y):
     assert box["height"] > 100
 
 
+@pytest.mark.long
 def test_a_room_is_added_and_the_patrol_drives_there(house, console):
     house.start_move_base()
     house.start_patrol()

@@ -344,6 +344,7 @@ class Outside(http.server.BaseHTTPRequestHandler):
         pass
 
 
+@pytest.mark.long
 def test_a_heartbeat_is_sent_while_all_is_well_and_only_then(ros, tmp_path):
     server = http.server.HTTPServer(("127.0.0.1", 0), Outside)
     threading.Thread(target=server.serve_forever, daemon=True).start()

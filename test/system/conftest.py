@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,5 +40,6 @@ def folder(master: object, tmp_path: Path) -> Path:
 
     kept = {"rosdistro", "rosversion", "run_id", "roslaunch", "use_sim_time"}
     for name in set(rospy.get_param("/")) - kept:  # whole trees: each call takes a while on a busy machine
-        rospy.delete_param(f"/{name}")
+        with contextlib.suppress(KeyError):  # a node of before may have taken it back meanwhile
+            rospy.delete_param(f"/{name}")
     return tmp_path
