@@ -144,6 +144,9 @@ class Reader:
         text = command.text
         if re.search(r"\bID\b", command.typed):
             text = command.typed.replace("ID", self._newest_incident())
+        if command.words[:2] == ["rosservice", "call"]:  # a node may be there some time before its services
+            name = f"/{command.words[2].lstrip('/')}"
+            _wait_for(lambda: name in _services(), f"the service of {command.where}", 60.0)
         done = subprocess.run(
             ["bash", "-c", text],
             cwd=self._desk,
@@ -246,6 +249,10 @@ def _nodes() -> set[str]:
     published, subscribed, services = rosgraph.Master("/pages").getSystemState()
     names = {node for topics in (published, subscribed, services) for _, nodes in topics for node in nodes}
     return {name for name in names if "house_watch" not in name and name != "/rosout"}
+
+
+def _services() -> set[str]:
+    return {name for name, _ in rosgraph.Master("/pages").getSystemState()[2]}
 
 
 def _wait_for(condition: object, what: str, timeout: float = 30.0) -> None:
