@@ -38,6 +38,7 @@ REACH, REACH_TURN = (0.5, 5.0), (0.12, 0.6)  # ... from and up to these [m, rad]
 MAP_ERROR = (0.03, 0.03, 0.008)  # of a search: of the small map, and of scans that several searches share [m, m, rad]
 STEP_ERROR = (0.003, 0.003, 0.001)  # of the front end from update to update [m, m, rad] ...
 WAY_ERROR = (0.02, 0.02, 0.005)  # ... and on a metre, likewise
+SUPPORT, NEARBY = 3, 3.0  # relations between two visits, within this way [m], that it takes to believe one of them
 EXPECTED = 3.0  # squared Mahalanobis length up to which a loop says what the poses say already
 SHIFT, SHIFT_TURN = 0.06, 0.02  # by so much less a relation is off where a new map is worth it [m, rad] ...
 PAUSE, SHARE = 5.0, 0.05  # ... after this way [m] or share of the whole way, because a long one takes long to draw
@@ -91,21 +92,22 @@ class LoopCloser:
             self._closed = last
         if lengths.max() < EXPECTED and ways[last] - self._solved_at < _pause(ways):
             return None
-        return self._correct(poses, ways, len(found.first))
+        return self._correct(poses, ways)
 
-    def _correct(self, poses: Array, ways: Array, new: int) -> Array | None:
-        """Solve the graph after `new` loops; returns the poses if the changes are worth it."""
+    def _correct(self, poses: Array, ways: Array) -> Array | None:
+        """Solve the graph; returns the poses if the changes are worth it."""
+        loops = self._supported(ways)
         index = np.arange(len(poses) - 1)
         steps = relative_moves(poses, index, index + 1)
         steps[: len(self._steps)] = self._steps
         squares = np.square(STEP_ERROR) + np.square(WAY_ERROR) * np.hypot(steps[:, 0], steps[:, 1])[:, None]
         chain = Relations(index, index + 1, steps, np.einsum("ri,ij->rij", 1.0 / squares, np.eye(3)))
-        found = solve(poses, chain, self.loops)
+        found = solve(poses, chain, loops)
         self._solved_at = float(ways[-1])
-        if found.weights[-new:].max() > 0.5:
-            self._closed = len(poses) - 1
         is_believed = found.weights > 0.5
-        off = [np.abs(errors_of(each, self.loops)[is_believed]) for each in (poses, found.poses)]
+        if is_believed[loops.second == len(poses) - 1].any():
+            self._closed = len(poses) - 1
+        off = [np.abs(errors_of(each, loops)[is_believed]) for each in (poses, found.poses)]
         gains = np.hypot(*off[0][:, :2].T) - np.hypot(*off[1][:, :2].T), off[0][:, 2] - off[1][:, 2]
         amount = max(gains[0].max(initial=0.0) / SHIFT, gains[1].max(initial=0.0) / SHIFT_TURN)
         if amount < 1.0 or (amount < AT_ONCE and ways[-1] - self._corrected_at < _pause(ways)):
@@ -113,6 +115,13 @@ class LoopCloser:
         self._corrected_at = float(ways[-1])
         self._steps = steps
         return aligned(found.poses, poses)
+
+    def _supported(self, ways: Array) -> Relations:
+        """The relations that are not alone: a wrong one hardly ever comes thrice between two visits."""
+        first, second = ways[self.loops.first], ways[self.loops.second]
+        near = (np.abs(first - first[:, None]) <= AROUND) & (np.abs(second - second[:, None]) <= NEARBY)
+        supported = near.sum(axis=1) >= SUPPORT
+        return Relations(*(values[supported] for values in self.loops))
 
     def _search(self, poses: Array, ways: Array) -> Relations:
         """Look for the last pose on earlier ways."""

@@ -100,23 +100,26 @@ class Visit:
         high = np.maximum(np.ceil((start[:2] + far) / TILE), low + 1).astype(np.int64)
         field = WallField(maps.walls(0, low, high), low * float(TILE), cells)
         found = field.find(np.ascontiguousarray(hits[:, :2]), Pose2D(*start), turn, least=LIKE)
-        return None if found is None else self._refine(other, found, FITS + MORE * reach)
+        # the guess may be right, and a shift along a wall fit the coarse search better
+        starts = [start] if found is None else [start, found]
+        share, place = max((self._refine(other, each) for each in starts), key=lambda pair: pair[0])
+        return place if share >= FITS + MORE * reach else None
 
-    def _refine(self, other: Visit, cells: Array, least: float) -> Place | None:
-        """The exact place from one in cells of the map, shape (3,); None if less than a share fits."""
+    def _refine(self, other: Visit, cells: Array) -> tuple[float, Place | None]:
+        """The share that fits, and the exact place from one in cells, shape (3,); None: the map knows too little."""
         hits, information = other.hits, np.empty((3, 3))
         kernels.refine_alone(self._maps.tables[0], self._maps.cells, cells, hits, TUNING, information)
         pose = Pose2D(*self._maps.from_cells(cells[None])[0])
         known, fitting, squares = self._fits(hits, pose)
         known_back, fitting_back, _ = other._fits(self.hits, invert(pose))
+        both = (fitting + fitting_back) / max(known + known_back, 1.0)
+        share = max(fitting / max(known, 1.0) - ONE_WAY, both)
         if known < KNOWN * len(hits):
-            return None
-        if max(fitting / known - ONE_WAY, (fitting + fitting_back) / (known + known_back)) < least:
-            return None
-        variance = max(squares / fitting, NARROWEST)
+            return share, None
+        variance = max(squares / max(fitting, 1.0), NARROWEST)
         information /= variance * max(1.0, len(hits) / INDEPENDENT)
         metres = np.array([self._resolution, self._resolution, 1.0])
-        return Place(pose, np.linalg.inv(information + np.diag(TUNING[3:])) * metres[:, None] * metres)
+        return share, Place(pose, np.linalg.inv(information + np.diag(TUNING[3:])) * metres[:, None] * metres)
 
     def _fits(self, hits: Array, pose: Pose2D) -> Array:
         """Count hits from a pose on the map, see `count_fits`, shape (3,)."""
