@@ -140,13 +140,13 @@ class Judge:
                     yield Finding(fault=Fault.LINK_GONE, subject=name, what=what)
 
     def _settings(self, parameters: Mapping[str, Mapping[str, str]]) -> Iterable[Finding]:
-        for whose, now in sorted(parameters.items()):
-            first = self._first.setdefault(whose, dict(now))
+        for subject, now in sorted(parameters.items()):
+            first = self._first.setdefault(subject, dict(now))
             changed = sorted(name for name in first.keys() | now.keys() if first.get(name) != now.get(name))
             if changed:
                 more = f" and {len(changed) - 5} more" if len(changed) > 5 else ""
                 what = f"would start with other settings than before: {', '.join(changed[:5])}{more} changed"
-                yield Finding(fault=Fault.SETTINGS_CHANGED, subject=whose, what=what)
+                yield Finding(fault=Fault.SETTINGS_CHANGED, subject=subject, what=what)
 
 
 def _master(what: str) -> Finding:

@@ -17,8 +17,8 @@ class Snapshot:
     Attributes:
         publishers, subscribers: nodes by topic.
         uris: address of each node, as http://HOST:PORT/.
-        parameters: digest of each watched parameter, by whose they are, for people: "node /x"; None: not asked this
-            time.
+        parameters: digests of the watched parameters, by their owner in words for people, such as "node /x"; None: not
+            asked this time.
         listening: TCP ports of this machine that others can reach; None: not asked this time.
         master_port: TCP port of the master; run_id: its mark since its start.
     """

@@ -96,7 +96,8 @@ class Visit:
         start = maps.to_cells(np.array([guess]))[0]
         cells = math.ceil(reach / maps.resolution)
         far = float(np.hypot(hits[:, 0], hits[:, 1]).max()) + cells
-        low = np.maximum(np.floor((start[:2] - far) / TILE), 0).astype(np.int64)
+        most = np.array(maps.tables.shape[:0:-1]) - 1  # a guess may lie off the map
+        low = np.clip(np.floor((start[:2] - far) / TILE), 0, most).astype(np.int64)
         high = np.maximum(np.ceil((start[:2] + far) / TILE), low + 1).astype(np.int64)
         field = WallField(maps.walls(0, low, high), low * float(TILE), cells)
         found = field.find(np.ascontiguousarray(hits[:, :2]), Pose2D(*start), turn, least=LIKE)

@@ -125,6 +125,8 @@ def test_what_a_visit_did_not_see_is_not_found_in_it() -> None:
     assert found.pose == pytest.approx((0.2, -0.1, 0.1), abs=0.015)
     assert np.linalg.eigvalsh(found.covariance).min() > 0.0
     assert visit.find(elsewhere, Pose2D(), 0.5, 0.1) is None
+    for far in (Pose2D(60.0, 50.0, 0.0), Pose2D(-60.0, -50.0, 0.0)):
+        assert visit.find(near, far, 0.5, 0.1) is None
 
 
 def test_a_solution_is_laid_onto_the_poses_as_they_were() -> None:
