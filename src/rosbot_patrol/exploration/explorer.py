@@ -18,6 +18,8 @@ log = logging.getLogger(__name__)
 
 _SAME = 0.6  # frontiers closer than this are one [m]
 _NEARER = 0.15  # decrease of the distance that counts as progress [m]
+_CLOSE = 0.4  # distance from a goal that is near enough to look, if the robot comes no nearer [m]
+_TRIES = 3  # goals that may fail before their frontier is left out
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +72,8 @@ class Explorer:
         self._tags = itertools.count(1)
         self._best, self._since, self._looked = math.inf, 0.0, -math.inf
         self._arrived: tuple[float, int] | None = None  # time, and the number of the map then
+        self._refused: list[tuple[float, float]] = []  # goals that failed
+        self._failures: list[tuple[float, float]] = []  # the frontiers of these
         self._goes_home = self._is_over = False
 
     def step(self, now: float, grid: Grid | None, maps: int, pose: Pose2D | None, link: GoalLink) -> Step:
@@ -95,17 +99,19 @@ class Explorer:
         if self._goes_home:
             return self._home_step(now, pose, state)
         assert self._target is not None
-        if state is GoalState.SUCCEEDED:
+        if state is GoalState.SUCCEEDED or self._arrived is not None:
             return self._look(now, grid, maps, pose)
         if state is GoalState.FAILED or self._stalls(now, pose):
+            if math.dist(pose[:2], self._goal.pose[:2]) < _CLOSE:
+                return self._look(now, grid, maps, pose)
             stalled = f"no progress for {self.params.progress_timeout:.0f} s"
-            reason = link.text or "move_base gave up" if state is GoalState.FAILED else stalled
-            log.warning("no way to the border at (%.1f, %.1f): %s", self._target.x, self._target.y, reason)
-            return self._leave_out(now, grid, pose)
+            return self._fail(
+                now, grid, pose, link.text or "move_base gave up" if state is GoalState.FAILED else stalled
+            )
         if now - self._looked < self.params.look_again:
             return Step(text=self._about)
         self._looked = now
-        found = Borders(grid, pose, self.params.frontiers).frontiers()
+        found = self._borders(grid, pose).frontiers()
         if not any(_is_at(f, self._target) for f in found):  # it was explored on the way
             return self._next(now, grid, pose)
         return Step(text=self._about, frontiers=tuple(found))
@@ -122,10 +128,25 @@ class Explorer:
         if maps < self._arrived[1] + 2 and now - self._arrived[0] < self.params.map_patience:
             return Step(is_waiting=True, text="waiting for the map")
         assert self._target is not None
-        if any(_is_at(f, self._target) for f in Borders(grid, pose, self.params.frontiers).frontiers()):
+        if any(_is_at(f, self._target) for f in self._borders(grid, pose).frontiers()):
             log.info("the border at (%.1f, %.1f) stays unknown from nearby", self._target.x, self._target.y)
             return self._leave_out(now, grid, pose)
         return self._next(now, grid, pose)
+
+    def _fail(self, now: float, grid: Grid, pose: Pose2D, reason: str) -> Step:
+        """Look for another goal at the frontier; after some, leave it out."""
+        assert self._target is not None
+        assert self._goal is not None
+        self._refused.append(self._goal.pose[:2])
+        self._failures.append((self._target.x, self._target.y))
+        log.warning("no way to the border at (%.1f, %.1f): %s", self._target.x, self._target.y, reason)
+        tried = sum(math.dist(place, self._failures[-1]) < _SAME for place in self._failures)
+        if tried < _TRIES and any(_is_at(f, self._target) for f in self._borders(grid, pose).frontiers()):
+            return self._next(now, grid, pose)
+        return self._leave_out(now, grid, pose)
+
+    def _borders(self, grid: Grid, pose: Pose2D) -> Borders:
+        return Borders(grid, pose, self.params.frontiers, self._refused)
 
     def _leave_out(self, now: float, grid: Grid, pose: Pose2D) -> Step:
         assert self._target is not None
@@ -133,7 +154,7 @@ class Explorer:
         return self._next(now, grid, pose)
 
     def _next(self, now: float, grid: Grid, pose: Pose2D) -> Step:
-        borders = Borders(grid, pose, self.params.frontiers)
+        borders = self._borders(grid, pose)
         self.area, found = borders.area, borders.frontiers()
         open_ = [f for f in found if not any(math.dist((f.x, f.y), place) < _SAME for place in self.left_out)]
         self._looked = now

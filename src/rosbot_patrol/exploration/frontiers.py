@@ -7,6 +7,7 @@ weighed by path length and size.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -22,6 +23,8 @@ Mask = NDArray[np.bool_]
 Array = NDArray[np.float64]
 
 _FREE_BELOW, _WALL_ABOVE = 25, 65  # occupancy, map_server's thresholds
+_ROOM = 4.0  # metres of nearness to a frontier that a metre of room around a goal is worth
+_REFUSED = 0.4  # radius around a place that was not reached, in which no goal is given [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +37,7 @@ class FrontierParams:
         0.12, unit="m", lo=0.0, doc="minimum distance of a frontier from obstacles: beams pass along walls"
     )
     frontier_near: float = param(1.0, unit="m", lo=0.1, doc="maximum distance of a goal from its frontier")
+    goal_room: float = param(0.35, unit="m", lo=0.0, doc="distance of goals from obstacles where there is such room")
     frontier_gain: float = param(0.8, lo=0.0, doc="metres of route that a metre of frontier is worth")
 
 
@@ -64,18 +68,21 @@ class Borders:
         grid: occupancy, -1 unknown, 0 free to 100 occupied.
         start: of the robot in map.
         params: limits.
+        refused: places (x, y) in map that the robot did not reach: no goal is given near them.
     """
 
-    def __init__(self, grid: Grid, start: Pose2D, params: FrontierParams) -> None:
-        self._info, self._params = grid.info, params
+    def __init__(
+        self, grid: Grid, start: Pose2D, params: FrontierParams, refused: Sequence[tuple[float, float]] = ()
+    ) -> None:
+        self._info, self._params, self._refused = grid.info, params, refused
         cells = grid.cells
         self._free = (cells >= 0) & (cells <= _FREE_BELOW)
-        is_wall = cells >= _WALL_ABOVE
-        self._unknown = ~self._free & ~is_wall
-        self._clearance = _distances(is_wall, grid.info.resolution)
+        self._is_wall = cells >= _WALL_ABOVE
+        self._unknown = ~self._free & ~self._is_wall
+        self._clearance = _distances(self._is_wall, grid.info.resolution)
         wide = self._free & (self._clearance >= params.robot_radius)
         self._ways = np.full(cells.shape, math.inf)
-        cell = self._nearest(wide, start.x, start.y)
+        cell = self._nearest(wide, start.x, start.y, 1.0)
         if cell is not None:
             self._ways = steps_over(wide, cell) * grid.info.resolution
 
@@ -102,7 +109,7 @@ class Borders:
     def _frontier(self, cells: NDArray[np.intp], length: float) -> Frontier | None:
         iy, ix = cells[int(np.hypot(*(cells - cells.mean(axis=0)).T).argmin())]
         x, y = self._info.centre_of(int(ix), int(iy))
-        stand = self._nearest(np.isfinite(self._ways), x, y, self._params.frontier_near)
+        stand = self._viewpoint(x, y)
         if stand is None:
             return None
         at = self._info.centre_of(*stand)
@@ -111,19 +118,47 @@ class Borders:
         cost = way - self._params.frontier_gain * length
         return Frontier(x=x, y=y, length=length, goal=Pose2D(*at, yaw), way=way, cost=cost)
 
-    def _nearest(self, mask: Mask, x: float, y: float, within: float = 1.0) -> tuple[int, int] | None:
+    def _viewpoint(self, x: float, y: float) -> tuple[int, int] | None:
+        """(ix, iy) of the reachable cell near a place from which to look at it, None if there is none.
+
+        In sight of it, away from `refused`, with room around, and near; a metre of room counts for `_ROOM` of nearness.
+        """
+        p, info = self._params, self._info
+        cells, gaps = self._near(np.isfinite(self._ways), x, y, p.frontier_near)
+        places = (cells + 0.5) * info.resolution + (info.origin_x, info.origin_y)
+        for place in self._refused:
+            gaps[np.hypot(*(places - place).T) < _REFUSED] = math.inf
+        gaps[~self._sees(cells, x, y)] = math.inf
+        if not np.isfinite(gaps).any():
+            return None
+        tight = np.maximum(p.goal_room - self._clearance[cells[:, 1], cells[:, 0]], 0.0)
+        ix, iy = cells[int((gaps + _ROOM * tight).argmin())]
+        return int(ix), int(iy)
+
+    def _sees(self, cells: NDArray[np.intp], x: float, y: float) -> Mask:
+        """From which cells (ix, iy), shape (K, 2), no wall hides a place; shape (K,)."""
+        to = np.array(self._info.cell_of(x, y))
+        steps = np.linspace(0.0, 1.0, 2 + 2 * math.ceil(self._params.frontier_near / self._info.resolution))
+        between = np.rint(cells[:, None] + (to - cells)[:, None] * steps[None, :, None]).astype(np.intp)
+        return ~np.asarray(self._is_wall[between[..., 1], between[..., 0]].any(axis=1))
+
+    def _nearest(self, mask: Mask, x: float, y: float, within: float) -> tuple[int, int] | None:
         """(ix, iy) of the mask's cell nearest to a place, None if there is none within a distance [m]."""
+        cells, gaps = self._near(mask, x, y, within)
+        if not len(cells):
+            return None
+        ix, iy = cells[int(gaps.argmin())]
+        return int(ix), int(iy)
+
+    def _near(self, mask: Mask, x: float, y: float, within: float) -> tuple[NDArray[np.intp], Array]:
+        """The mask's cells (ix, iy) within a distance of a place [m], shape (K, 2), and their distances [m], (K,)."""
         info, reach = self._info, math.ceil(within / self._info.resolution)
         ix, iy = info.cell_of(x, y)
         x0, y0 = max(ix - reach, 0), max(iy - reach, 0)
         part = np.argwhere(mask[y0 : max(iy + reach + 1, 0), x0 : max(ix + reach + 1, 0)])
-        if not len(part):
-            return None
-        gaps = np.hypot(part[:, 1] + x0 - ix, part[:, 0] + y0 - iy)
-        k = int(gaps.argmin())
-        if gaps[k] * info.resolution > within:
-            return None
-        return int(part[k, 1]) + x0, int(part[k, 0]) + y0
+        cells = part[:, ::-1] + (x0, y0)
+        gaps = np.hypot(cells[:, 0] - ix, cells[:, 1] - iy) * info.resolution
+        return cells[gaps <= within], gaps[gaps <= within]
 
 
 def _distances(is_wall: Mask, resolution: float) -> Array:

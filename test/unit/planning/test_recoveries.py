@@ -56,7 +56,7 @@ def test_a_rotation_turns_once():
 
 def test_a_rotation_ends_where_something_is_in_the_way():
     local = costmap()
-    local.cells[local.info.cell_of(0.0, 0.2)[1], local.info.cell_of(0.0, 0.2)[0]] = 254
+    local.cells[local.info.cell_of(0.0, 0.17)[1], local.info.cell_of(0.0, 0.17)[0]] = 254
     rotate = Rotate(RotateParams(), name="r")
     rotate.start(view(Pose2D(), 0.0, local))
     assert rotate.step(view(Pose2D(), 0.0, local)) is None

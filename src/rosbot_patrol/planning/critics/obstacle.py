@@ -168,9 +168,9 @@ class ObstacleCritic:
         return bool(kernels.count_touching(costmap.cells, *place, outline, *pose) > 0)
 
     def is_free(self, costmap: Grid, pose: Pose2D, twist: Twist2D, motion: Motion) -> bool:
-        """Whether one velocity can be driven from a pose."""
+        """Whether one velocity can be driven from a pose; a turn on the spot needs no room for the padding."""
         samples = np.array([twist], dtype=np.float64)
-        around = self.survey(costmap, pose, motion.reach(samples, STOP))
+        around = self.survey(costmap, pose, motion.reach(samples, STOP), bare=not any(twist[:2]))
         return bool(np.isfinite(self.drive(around, twist, samples, motion)[0]))
 
     def trace(self, pose: Pose2D, velocity: Twist2D, twist: Twist2D, motion: Motion) -> Array:

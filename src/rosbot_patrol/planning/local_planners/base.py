@@ -193,6 +193,8 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
     ) -> tuple[Array, Array]:
         """Mean obstacle cost of two models of how the base reaches a velocity; both must be free.
 
+        Turns on the spot need no room for the padding.
+
         Args:
             view: input of this cycle.
             samples: velocities (vx, vy, wz), shape (K, 3).
@@ -204,6 +206,14 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         Returns:
             Costs, shape (K,), inf if blocked, and the final poses of `motion`, shape (K, 3).
         """
+        turns = ~samples[:, :2].any(axis=1)
+        if not bare and turns.any() and not turns.all():
+            danger, ends = np.empty(len(samples)), np.empty((len(samples), 3))
+            for part, outline in ((~turns, False), (turns, True)):
+                some = np.ascontiguousarray(samples[part])
+                danger[part], ends[part] = self._dangers(view, some, motion, other, growth=growth, bare=outline)
+            return danger, ends
+        bare = bare or bool(turns.all())
         reach = motion.reach(samples, view.velocity)
         around = self._obstacles.survey(view.costmap, view.pose, reach, growth=growth, bare=bare)
         ends = np.empty((len(samples), 3))

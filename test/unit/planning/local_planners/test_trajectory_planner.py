@@ -137,6 +137,23 @@ def test_a_robot_that_touches_something_moves_away_and_not_into_it():
     assert twist.vx <= 0.0
 
 
+def test_out_of_a_corner_that_leaves_its_padding_no_room_it_goes_by_its_bare_outline():
+    cells = empty()
+    block(cells, -0.28, -1.5, -0.22, 0.28)  # a wall beside the padding, to which the robot turns its back a little
+    block(cells, -0.28, 0.22, 1.2, 0.28)  # another one ahead
+    start = Pose2D(0.0, 0.0, math.radians(77.0))
+    planner = make()
+    planner.set_plan(line(0, 0, 0.15, -1.2, -1.5))
+    pose, poses = drive(planner, start, cells)
+    assert math.dist(pose[:2], (0.15, -1.2)) <= 0.12
+    body = Footprint(CORNERS, CORNERS).outline(0.0125)
+    for x, y, yaw in poses:
+        c, s = math.cos(yaw), math.sin(yaw)
+        assert not any(
+            cells[iy, ix] for ix, iy in (INFO.cell_of(x + c * a - s * b, y + s * a + c * b) for a, b in body)
+        )
+
+
 def test_unknown_space_and_the_edge_of_the_map_are_not_driven_into():
     cells = empty()
     cells[:, INFO.cell_of(0.2, 0)[0] :] = 255
@@ -204,16 +221,17 @@ def test_heading_scoring_turns_towards_the_plan():
 
 
 def test_a_holonomic_base_goes_sideways_where_nothing_else_is_free():
-    cells = block(block(empty(), 0.21, -0.6, 0.3, 0.6), -0.3, -0.6, -0.21, 0.6)  # between two walls, no room to turn
-    plan = line(0, 0, 0, 1.5)
+    cells = block(block(empty(), 0.16, -0.6, 0.3, 0.6), -0.3, -0.6, -0.21, 0.6)  # between two walls, no room to turn
+    here = Pose2D(-0.03, 0.0, 0.0)
+    plan = line(-0.03, 0, -0.03, 1.5)
     tight = {"escape_vel": 0.0, "min_vel_x": 0.1, "min_in_place_vel_theta": 1.5, "max_vel_theta": 1.5}
     stuck = make(**tight)
     stuck.set_plan(plan)
     with pytest.raises(ControlError):
-        stuck.compute(view(cells=cells))
+        stuck.compute(view(here, cells=cells))
     planner = make(holonomic_robot=True, y_vels=[-0.2, 0.2], **tight)
     planner.set_plan(plan)
-    assert planner.compute(view(cells=cells)) == Twist2D(0.0, 0.2, 0.0)
+    assert planner.compute(view(here, cells=cells)) == Twist2D(0.0, 0.2, 0.0)
 
 
 def test_wrong_sideways_speeds_are_named():
