@@ -32,7 +32,7 @@ NEAR, NEAR_TURN = 0.05, 5e-4  # steps of a refinement [cells, rad] below which a
 DONE, DONE_TURN = 0.01, 1e-4  # steps at which it ends
 WIDEST = 1.0  # largest variance of the beams' distances from the walls [cells2]
 LOSS = 3.0  # a refinement that makes the pose less likely by more than this, as a logarithm, is rejected ...
-WELL = 0.93  # ... unless this share of the beams fits after it
+WELL = 0.7  # ... unless this share of the beams fits after it
 FINER = 0.125  # steps of the search that goes on instead, as shares of the first ones
 
 
