@@ -3,8 +3,8 @@
 Differs:
     - All can be cancelled at any step.
     - The turn sums wrapped increments, has a time limit, and goes on until something is right ahead. Upstream does not
-      start if any part of the turn is blocked, and so sees less. The bare outline is checked; upstream checks the
-      padded one, and cannot turn beside a wall.
+      start if any part of the turn is blocked, and so sees less. Where the bare outline can turn right round, it is
+      the one that is checked; upstream checks the padded one, and cannot turn beside a wall.
     - Without `layer_names` all layers with sensors are cleared; upstream clears only a layer named "obstacles".
     - MoveSlowAndClear slows the local planner in use; upstream calls dynamic_reconfigure of the one named by
       `planner_namespace`.

@@ -25,8 +25,8 @@ from rosbot_patrol.planning.registry import make_global_planner, make_local_plan
 from rosbot_patrol.scan import LaserScan
 
 
-def costmap():
-    tree = {"rolling_window": True, "width": 4.0, "height": 4.0, "resolution": 0.05, "robot_radius": 0.2}
+def costmap(**shape):
+    tree = {"rolling_window": True, "width": 4.0, "height": 4.0, "resolution": 0.05, **(shape or {"robot_radius": 0.2})}
     made = LayeredCostmap(read_costmap(tree))
     made.update(0.0, Pose2D())
     return made
@@ -55,8 +55,8 @@ def test_a_rotation_turns_once():
 
 
 def test_a_rotation_ends_where_something_is_in_the_way():
-    local = costmap()
-    local.cells[local.info.cell_of(0.0, 0.17)[1], local.info.cell_of(0.0, 0.17)[0]] = 254
+    local = costmap(footprint=[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]])
+    local.cells[local.info.cell_of(0.0, 0.17)[1], local.info.cell_of(0.0, 0.17)[0]] = 254  # a corner would hit it
     rotate = Rotate(RotateParams(), name="r")
     rotate.start(view(Pose2D(), 0.0, local))
     assert rotate.step(view(Pose2D(), 0.0, local)) is None

@@ -87,6 +87,7 @@ class ObstacleCritic:
     def __init__(self, footprint: Footprint, *, resolution: float) -> None:
         self._padded = footprint.outline(resolution * _SPACING)
         self._bare = Footprint(footprint.body, footprint.body).outline(resolution * _SPACING)
+        self._disc = _disc(float(np.hypot(*footprint.body.T).max()), _SPACING * resolution)
         self._spacing = max(_widest_gap(self._padded), _widest_gap(self._bare))
         self._reach = footprint.circumscribed_radius
 
@@ -167,16 +168,32 @@ class ObstacleCritic:
         place = (info.resolution, info.origin_x, info.origin_y)
         return bool(kernels.count_touching(costmap.cells, *place, outline, *pose) > 0)
 
+    def has_room_to_turn(self, costmap: Grid, pose: Pose2D) -> bool:
+        """Whether the robot without its padding can turn right round at a pose."""
+        info = costmap.info
+        place = (info.resolution, info.origin_x, info.origin_y)
+        return bool(kernels.count_touching(costmap.cells, *place, self._disc, *pose) == 0)
+
     def is_free(self, costmap: Grid, pose: Pose2D, twist: Twist2D, motion: Motion) -> bool:
-        """Whether one velocity can be driven from a pose; a turn on the spot needs no room for the padding."""
+        """Whether one velocity can be driven from a pose: a turn without padding where there is room to turn."""
         samples = np.array([twist], dtype=np.float64)
-        around = self.survey(costmap, pose, motion.reach(samples, STOP), bare=not any(twist[:2]))
+        bare = not any(twist[:2]) and self.has_room_to_turn(costmap, pose)
+        around = self.survey(costmap, pose, motion.reach(samples, STOP), bare=bare)
         return bool(np.isfinite(self.drive(around, twist, samples, motion)[0]))
 
     def trace(self, pose: Pose2D, velocity: Twist2D, twist: Twist2D, motion: Motion) -> Array:
         """Poses along a velocity, shape (N, 3)."""
         start = np.array([*pose, *velocity], dtype=np.float64)
         return kernels.trace(start, np.array([twist], dtype=np.float64), 0, motion.packed(self._reach, self._spacing))
+
+
+def _disc(radius: float, spacing: float) -> Array:
+    """Points on circles around the origin, the largest of a radius [m], at most `spacing` apart [m]; shape (M, 2)."""
+    rings = []
+    for r in np.linspace(0.0, radius, math.ceil(radius / spacing) + 1):
+        angles = np.linspace(0.0, math.tau, max(math.ceil(math.tau * r / spacing), 1), endpoint=False)
+        rings.append(r * np.column_stack((np.cos(angles), np.sin(angles))))
+    return np.concatenate(rings)
 
 
 def _widest_gap(outline: Array) -> float:

@@ -193,7 +193,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
     ) -> tuple[Array, Array]:
         """Mean obstacle cost of two models of how the base reaches a velocity; both must be free.
 
-        Turns on the spot need no room for the padding.
+        Turns on the spot are checked without the padding where the bare robot can turn right round.
 
         Args:
             view: input of this cycle.
@@ -207,13 +207,12 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
             Costs, shape (K,), inf if blocked, and the final poses of `motion`, shape (K, 3).
         """
         turns = ~samples[:, :2].any(axis=1)
-        if not bare and turns.any() and not turns.all():
+        if not bare and turns.any() and self._obstacles.has_room_to_turn(view.costmap, view.pose):
             danger, ends = np.empty(len(samples)), np.empty((len(samples), 3))
             for part, outline in ((~turns, False), (turns, True)):
                 some = np.ascontiguousarray(samples[part])
                 danger[part], ends[part] = self._dangers(view, some, motion, other, growth=growth, bare=outline)
             return danger, ends
-        bare = bare or bool(turns.all())
         reach = motion.reach(samples, view.velocity)
         around = self._obstacles.survey(view.costmap, view.pose, reach, growth=growth, bare=bare)
         ends = np.empty((len(samples), 3))

@@ -14,7 +14,7 @@ Differs:
       Upstream then finds no velocity, or cannot turn on the spot.
     - If nothing is free over `sim_time`, slow motions are tried over 0.6 s. A robot whose footprint touches an obstacle
       may move if it then touches less, or back out at `min_vel_trans`. If only the padding touches, it may move slowly
-      by its bare outline. Turns on the spot are checked by that outline, too.
+      by its bare outline. So are turns on the spot where that outline can turn right round.
     - The local goal lies about a metre along the plan, beyond the reach of a trajectory; upstream takes the last pose
       in view and gets stuck in a bend. If something blocks the plan, the way round it becomes the plan; without one,
       the robot stops short of the place and says so.

@@ -16,8 +16,8 @@ Differs:
       may turn to and fro for ever.
     - A robot whose footprint touches an obstacle may move if it then touches less. If only the padding touches, it may
       move slowly by its bare outline. Upstream finds no trajectory.
-    - Turns on the spot are checked by the bare outline. With its padding a robot beside a wall could not turn round,
-      and crept on into the corner that it should leave.
+    - Turns on the spot are checked by the bare outline where that can turn right round. With its padding a robot beside
+      a wall could not, and crept on into the corner that it should leave.
     - The local goal lies about a metre along the plan, beyond the reach of a trajectory; upstream takes the last pose
       in view and cuts corners. If something blocks the plan, the way round it becomes the plan; without one, the robot
       stops short of the place and says so.
