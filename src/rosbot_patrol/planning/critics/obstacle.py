@@ -87,7 +87,7 @@ class ObstacleCritic:
     def __init__(self, footprint: Footprint, *, resolution: float) -> None:
         self._padded = footprint.outline(resolution * _SPACING)
         self._bare = Footprint(footprint.body, footprint.body).outline(resolution * _SPACING)
-        self._disc = _disc(float(np.hypot(*footprint.body.T).max()), _SPACING * resolution)
+        self._disc = _disc(float(np.hypot(*footprint.body.T).max()), 0.5 * resolution)
         self._spacing = max(_widest_gap(self._padded), _widest_gap(self._bare))
         self._reach = footprint.circumscribed_radius
 

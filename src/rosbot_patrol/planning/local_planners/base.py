@@ -206,16 +206,13 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         Returns:
             Costs, shape (K,), inf if blocked, and the final poses of `motion`, shape (K, 3).
         """
-        turns = ~samples[:, :2].any(axis=1)
-        if not bare and turns.any() and self._obstacles.has_room_to_turn(view.costmap, view.pose):
-            danger, ends = np.empty(len(samples)), np.empty((len(samples), 3))
-            for part, outline in ((~turns, False), (turns, True)):
-                some = np.ascontiguousarray(samples[part])
-                danger[part], ends[part] = self._dangers(view, some, motion, other, growth=growth, bare=outline)
-            return danger, ends
         reach = motion.reach(samples, view.velocity)
         around = self._obstacles.survey(view.costmap, view.pose, reach, growth=growth, bare=bare)
         ends = np.empty((len(samples), 3))
         danger = self._obstacles.drive(around, view.velocity, samples, motion, ends=ends)
         danger = 0.5 * danger + 0.5 * self._obstacles.drive(around, view.velocity, samples, other, failed=danger)
+        held = ~samples[:, :2].any(axis=1) & np.isinf(danger)
+        if not bare and held.any() and self._obstacles.has_room_to_turn(view.costmap, view.pose):
+            turns = np.ascontiguousarray(samples[held])
+            danger[held], ends[held] = self._dangers(view, turns, motion, other, bare=True)
         return danger, ends
