@@ -7,6 +7,8 @@ import functools
 import hashlib
 import json
 import os
+import platform
+import sysconfig
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -15,6 +17,7 @@ from typing import Any
 from rosbot_patrol.errors import StateError
 
 PACKAGE = Path(__file__).resolve().parent
+_EXTENSION: str = sysconfig.get_config_var("EXT_SUFFIX")
 DISK_FULL = frozenset((errno.ENOSPC, errno.EDQUOT))  # errno of an OSError: no room on the disk, or in the user's quota
 
 
@@ -118,12 +121,28 @@ def kernel_sources() -> list[Path]:
 
 @functools.lru_cache(maxsize=1)
 def cache_dir() -> Path:
-    """Folder of the compiled kernels, named by a hash of numba's version and all kernel sources.
+    """Folder of the compiled kernels, named by a hash of all that they depend on.
 
-    numba's `cache=True` does not notice changes of a callee in another module, and cannot write to a read-only install.
+    These are their sources, what compiles them, the versions of numba and Python, and the processor: a home folder may
+    move to another machine. numba's own cache does not notice changes of a callee in another module.
     """
-    digest = hashlib.sha256(version("numba").encode())
-    for path in kernel_sources():
+    digest = hashlib.sha256(f"{version('numba')} {_EXTENSION} {_processor()}".encode())
+    for path in (*kernel_sources(), PACKAGE / "kernels" / "compiler.py"):
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return cache_folder() / f"numba-{digest.hexdigest()[:16]}"
+
+
+def kernel_library() -> Path:
+    """The library of all kernels, which `python -m rosbot_patrol.kernels` makes."""
+    return cache_dir() / f"kernels{_EXTENSION}"
+
+
+def _processor() -> str:
+    """What tells one kind of processor from another, as Linux has it."""
+    names = ("model name", "flags", "CPU part", "Features")
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n", maxsplit=1)[0].splitlines()
+    except OSError:
+        lines = []
+    return " ".join((platform.machine(), *(line for line in lines if line.startswith(names))))

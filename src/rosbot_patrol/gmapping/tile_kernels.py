@@ -37,7 +37,7 @@ FULL = 65535
 FULL_SHARE = 10  # a cell is a wall if more than one in this many beams ended in it
 
 
-@kernel()
+@kernel("int64(int32[:, ::1], uint16[:, :, ::1], int64, int64, int64)")
 def walls_from(table: Table, cells: Cells, x: int, y: int, count: int) -> int:
     """Bits of the walls among `count` cells (48 at most) from column x on in row y; cells may lie outside."""
     ty, bits = y >> BITS, np.int64(0)

@@ -23,7 +23,7 @@ from typing import Any
 import yaml
 
 from rosbot_patrol.errors import HostError, ParamError, PatrolError
-from rosbot_patrol.files import cache_dir, write_json
+from rosbot_patrol.files import kernel_library, write_json
 from rosbot_patrol.host import old_logs, orphans
 from rosbot_patrol.host.service_units import LOGS, ROLES, SETTINGS
 from rosbot_patrol.host.watchdog import Systemd
@@ -96,8 +96,7 @@ def _serve() -> int:
 
 def _compile() -> None:
     """Compile what the nodes would else compile at their start, once for this user and state of the sources."""
-    folder = cache_dir()
-    if folder.exists():
+    if kernel_library().exists():
         return
     log.info("kernels and network are compiled for this user, once: a minute or two")
     Systemd().say("compiles, once")

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.errors import ImageError
+from rosbot_patrol.images import rvl_kernels
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.params import param
 
@@ -103,9 +104,8 @@ def _inverse(depth: NDArray[Any], a: np.float32, b: np.float32, depth_max: np.fl
 
 
 def _rvl(values: NDArray[Any]) -> bytes:
-    kernels = importlib.import_module("rosbot_patrol.images.rvl_kernels")  # brings numba, 100 MB
     room = np.empty(3 * values.size + 16, dtype=np.uint8)
-    used = kernels.encode(np.ascontiguousarray(values).reshape(-1), room)
+    used = rvl_kernels.encode(np.ascontiguousarray(values).reshape(-1), room)
     return _SIZE.pack(values.shape[1], values.shape[0]) + room[:used].tobytes()
 
 
@@ -114,8 +114,7 @@ def _from_rvl(body: bytes, text: str) -> NDArray[Any]:
     if not 0 < width * height <= MOST_PIXELS:
         raise ImageError(f"{len(body)} bytes of the format '{text}' claim a picture of {width}x{height}")
     values = np.empty(height * width, dtype=np.uint16)
-    kernels = importlib.import_module("rosbot_patrol.images.rvl_kernels")
-    if kernels.decode(np.frombuffer(body, dtype=np.uint8, offset=_SIZE.size).copy(), values) != values.size:
+    if rvl_kernels.decode(np.frombuffer(body, dtype=np.uint8, offset=_SIZE.size).copy(), values) != values.size:
         raise ImageError(f"{len(body)} bytes of the format '{text}' do not hold the {width}x{height} values they claim")
     return values.reshape(height, width)
 

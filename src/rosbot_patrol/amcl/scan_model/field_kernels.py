@@ -13,10 +13,22 @@ Array = NDArray[np.float64]
 Table = NDArray[np.float32]
 
 
-@kernel(
-    "void(float64[:, ::1], float64[::1], float64[::1], float32[:, ::1], float64, float64, float64, float64[::1])",
-    fastmath={"reassoc", "contract"},
-)
+@kernel(fastmath={"reassoc", "contract"})
+def _sum_at(pose: tuple[float, float, float, float], xs: Array, ys: Array, table: Table) -> float:
+    """Sum a table's values at the beams' end points, from one pose (x, y, cos, sin) in units of the table's cells."""
+    height, width = table.shape
+    flat = table.reshape(height * width)
+    top, right = height - 1.0, width - 1.0
+    x, y, c, s = pose
+    total = 0.0
+    for k in range(xs.shape[0]):
+        column = np.int32(min(max(x + c * xs[k] - s * ys[k], 0.0), right))
+        row = np.int32(min(max(y + s * xs[k] + c * ys[k], 0.0), top))
+        total += flat[np.uint32(row) * np.uint32(width) + np.uint32(column)]
+    return total
+
+
+@kernel("void(float64[:, ::1], float64[::1], float64[::1], float32[:, ::1], float64, float64, float64, float64[::1])")
 def sum_over_beams(
     poses: Array, xs: Array, ys: Array, table: Table, origin_x: float, origin_y: float, resolution: float, out: Array
 ) -> None:
@@ -32,19 +44,11 @@ def sum_over_beams(
         resolution: edge of a cell [m].
         out: the sums, shape (N,).
     """
-    height, width = table.shape
-    flat = table.reshape(height * width)
-    top, right = height - 1.0, width - 1.0
     for i in range(poses.shape[0]):
         x = (poses[i, 0] - origin_x) / resolution
         y = (poses[i, 1] - origin_y) / resolution
-        c, s = math.cos(poses[i, 2]) / resolution, math.sin(poses[i, 2]) / resolution
-        total = 0.0
-        for k in range(xs.shape[0]):
-            column = np.int32(min(max(x + c * xs[k] - s * ys[k], 0.0), right))
-            row = np.int32(min(max(y + s * xs[k] + c * ys[k], 0.0), top))
-            total += flat[np.uint32(row) * np.uint32(width) + np.uint32(column)]
-        out[i] = total
+        pose = (x, y, math.cos(poses[i, 2]) / resolution, math.sin(poses[i, 2]) / resolution)
+        out[i] = _sum_at(pose, xs, ys, table)
 
 
 @kernel(

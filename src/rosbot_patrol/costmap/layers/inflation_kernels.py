@@ -38,7 +38,7 @@ def _plus(a: int, b: int) -> int:
     return total if total >= b else _NONE
 
 
-@kernel("boolean(uint16[::1], int64, int64, uint16[::1], int64, uint16[::1])", inline="never")
+@kernel(inline="never")
 def _nearest_in_row(
     squares: NDArray[np.uint16], at: int, reach: int, least: NDArray[np.uint16], d2_max: int, found: NDArray[np.uint16]
 ) -> bool:
