@@ -14,10 +14,10 @@ from rosbot_patrol.files import kernel_library
 USE = """
 import sys
 import numpy as np
-from rosbot_patrol.maps.distance_kernels import *
-from rosbot_patrol.gmapping.cholesky_kernels import *
-from rosbot_patrol.planning.critics.sweep_kernels import count_steps
-print(count_steps(np.ones((1, 3)), 0, np.ones(9)), "numba" in sys.modules)
+from rosbot_patrol.amcl.motion_kernels import move_sliding
+poses = np.zeros((1, 3))
+move_sliding(poses, np.array([0.0, 4.0, 0.0]), np.zeros(3), np.zeros((1, 3)))
+print(round(poses[0, 0]), "numba" in sys.modules)
 """
 
 
