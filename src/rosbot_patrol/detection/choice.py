@@ -84,6 +84,17 @@ def choose_detector(params: DarknetParams, folders: NetworkFolders) -> Choice:
     return choice
 
 
+def open_network(name: str) -> Choice:
+    """Make the detector that `network:=NAME` makes, from the files of the installed packages.
+
+    Raises:
+        DetectorError: as `choose_detector`.
+        ParamError: likewise, or there is no network of this name.
+    """
+    folders = NetworkFolders(own=package_file("models"), darknet=package_folder("darknet_ros"))
+    return choose_detector(network_settings(name, DarknetParams(), folders), folders)
+
+
 def network_settings(name: str, params: DarknetParams, folders: NetworkFolders) -> DarknetParams:
     """Parameters with the settings of the network of this name, and the folders where its files belong.
 
@@ -196,8 +207,7 @@ def main() -> None:
     """Print which network `auto` takes here, and why no better one, without a log."""
     logging.disable()
     try:
-        folders = NetworkFolders(own=package_file("models"), darknet=package_folder("darknet_ros"))
-        choice = choose_detector(DarknetParams(network="auto"), folders)
+        choice = open_network("auto")
     except DetectorError as err:
         print(f"The guard has {err}")
         return

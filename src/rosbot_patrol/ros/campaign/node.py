@@ -37,6 +37,7 @@ from rosbot_patrol.campaign.plan import Patrol, plan_patrol
 from rosbot_patrol.campaign.progress import progress_line
 from rosbot_patrol.campaign.record import PLAN, RESULT, CampaignFolder, Result, Settings, results_in
 from rosbot_patrol.campaign.table import HEADINGS, figures, markdown_table, row, summary, text_table
+from rosbot_patrol.detection.choice import open_network
 from rosbot_patrol.errors import PatrolError, WorldError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.geometry import Pose2D
@@ -100,9 +101,15 @@ def options(arguments: list[str]) -> argparse.Namespace:
 
 
 class Campaign:
-    """Patrols of a folder."""
+    """Patrols of a folder.
+
+    Raises:
+        DetectorError: the network's files are missing or damaged.
+        ParamError: there is no such network.
+    """
 
     def __init__(self, given: argparse.Namespace) -> None:
+        open_network(given.network)  # without it nobody would be seen, and each patrol be a miss
         self._given = given
         self._root = package_root()
         settings = Settings(
