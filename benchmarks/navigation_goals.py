@@ -4,11 +4,11 @@
     PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_goals.py [--goals 200] [--seed 1] [--house NAME]
 
 The robot's own programs (amcl, costmaps, move_base, collision guard) run in one process with the simulator, on its
-clock (`rosbot_patrol/closed_loop/loop.py`). Each goal starts where the robot stands after the last one. A person walks
-along the robot's plan, towards it or from behind, once; or across it, to and fro over 2.4 to 5 m. The speed is 0.5 to
-1.2 m/s, and the person never stops: at the robot they step over it, and at the end of the path they leave. A contact
-with a wall or a thing always counts; one with a person counts unless the robot's wheels had stood for 0.5 s. `ideal` is
-the plan's length at full speed.
+clock (`rosbot_patrol/closed_loop/loop.py`). Each goal starts where the robot stands after the last one, and has a way
+in the true world that leaves the padding of 3 cm on both sides. A person walks along the robot's plan, towards it or
+from behind, once; or across it, to and fro over 2.4 to 5 m. The speed is 0.5 to 1.2 m/s, and the person never stops: at
+the robot they step over it, and at the end of the path they leave. A contact with a wall or a thing always counts; one
+with a person counts unless the robot's wheels had stood for 0.5 s. `ideal` is the plan's length at full speed.
 """
 
 from __future__ import annotations
@@ -27,25 +27,29 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
 
 from rosbot_patrol.closed_loop.loop import ClosedLoop, Drive, read_profile  # noqa: E402
-from rosbot_patrol.costmap.costs import INSCRIBED  # noqa: E402
+from rosbot_patrol.costmap.costs import INSCRIBED, LETHAL  # noqa: E402
 from rosbot_patrol.errors import PlanningError, WorldError  # noqa: E402
 from rosbot_patrol.geometry import Pose2D  # noqa: E402
-from rosbot_patrol.grid import Grid  # noqa: E402
+from rosbot_patrol.grid import Grid, GridInfo  # noqa: E402
 from rosbot_patrol.maps.map_io import read_map  # noqa: E402
 from rosbot_patrol.planning.registry import make_global_planner  # noqa: E402
 from rosbot_patrol.simulation.engine import Engine, EngineParams  # noqa: E402
 from rosbot_patrol.simulation.render.egl import make_renderer  # noqa: E402
 from rosbot_patrol.simulation.robot.description import load_robot  # noqa: E402
 from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies  # noqa: E402
-from rosbot_patrol.simulation.sdf.world import load_world  # noqa: E402
+from rosbot_patrol.simulation.sdf.world import World, load_world  # noqa: E402
 
 HOUSES = {"house": "rosbot_map", "flat": "flat_map", "office": "office_map"}
 FULL_SPEED = 0.36  # [m/s]
+WAY = 0.17  # half the free width of a way to a goal: half the robot's width, and its padding [m]
+FINE = 5  # points in a cell's edge for this width
 ROOM = 0.28  # free radius around a goal: the robot's corners, its padding, and the goal tolerance [m]
 HEIGHTS = (0.01, 0.04, 0.07, 0.1, 0.16, 0.2)  # heights at which the robot is checked for contact [m]
 TRIES = 30  # attempts to find a goal with a path that a person can walk
@@ -86,12 +90,40 @@ def _gap(cut: Slice, x: float, y: float) -> float:
     return min(gaps.min(initial=math.inf), rounds.min(initial=math.inf))
 
 
-def free_poses(loop: ClosedLoop, rng: np.random.Generator) -> Iterator[Pose2D]:
-    """Places with room to turn in the true world, and reachable in the global costmap."""
+def _outline(cut: Slice, step: float) -> NDArray[np.float64]:
+    """Points on the obstacles of a section, at most `step` apart [m], shape (N, 2)."""
+    parts = [np.linspace(a[:2], a[2:], 2 + int(math.dist(a[:2], a[2:]) / step)) for a in cut.segments]
+    for x, y, radius in cut.circles[:, :3]:
+        turns = np.linspace(0.0, math.tau, 9 + int(math.tau * radius / step))
+        parts.append(np.column_stack((x + radius * np.cos(turns), y + radius * np.sin(turns))))
+    return np.concatenate(parts)
+
+
+def narrow_cells(world: World, info: GridInfo) -> NDArray[np.bool_]:
+    """Cells of a map whose centre is nearer than WAY to an obstacle of the true world, shape (H, W)."""
+    step = info.resolution / FINE
+    points = np.concatenate([_outline(slice_bodies(world.bodies, height), step) for height in HEIGHTS])
+    ix, iy = np.floor((points - (info.origin_x, info.origin_y)).T / step).astype(int)
+    inside = (ix >= 0) & (iy >= 0) & (ix < info.width * FINE) & (iy < info.height * FINE)
+    ix, iy = ix[inside], iy[inside]
+    x0, y0, x1, y1 = (each // FINE for each in (ix.min(), iy.min(), ix.max(), iy.max()))  # farther out there is nothing
+    is_free = np.ones(((y1 - y0 + 1) * FINE, (x1 - x0 + 1) * FINE), dtype=bool)
+    is_free[iy - y0 * FINE, ix - x0 * FINE] = False
+    is_narrow = np.zeros((info.height, info.width), dtype=bool)
+    gaps = distance_transform_edt(is_free)[FINE // 2 :: FINE, FINE // 2 :: FINE] * step
+    is_narrow[y0 : y1 + 1, x0 : x1 + 1] = gaps < WAY
+    return is_narrow
+
+
+def free_poses(loop: ClosedLoop, rng: np.random.Generator, is_narrow: NDArray[np.bool_]) -> Iterator[Pose2D]:
+    """Places with room to turn in the true world, and reachable in the costmap by a way that is wide enough there."""
     cuts = [slice_bodies(loop.engine.world.bodies, height) for height in HEIGHTS]
     costmap = loop.global_costmap
     planner = make_global_planner("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}})
-    cells = costmap.cells
+    cells = np.where(is_narrow, np.uint8(LETHAL), costmap.cells)
+    ix, iy = costmap.info.cell_of(loop.map_pose.x, loop.map_pose.y)
+    near = tuple(slice(max(at - FINE, 0), at + FINE + 1) for at in (iy, ix))
+    cells[near] = costmap.cells[near]  # wherever the robot stands, it can start
     free = np.argwhere(cells < INSCRIBED // 2)
     while True:
         iy, ix = free[rng.integers(len(free))]
@@ -175,6 +207,7 @@ def drives(house: str, count: int, seed: int, *, only_block: int | None = None) 
     known = read_map(ROOT / "maps" / f"{HOUSES[house]}.yaml")
     world = load_world(ROOT / "worlds" / f"{house}.world")
     params = read_profile(ROOT / "config" / "tuned")
+    is_narrow = narrow_cells(world, known.info)
     for first in range(0, count, BLOCK):
         if only_block not in (None, first // BLOCK):
             continue
@@ -184,7 +217,7 @@ def drives(house: str, count: int, seed: int, *, only_block: int | None = None) 
         loop = ClosedLoop(engine, known, params, seed=seed + first)
         loop.drive_to(Pose2D(0.0, 0.0, 1.5), 20.0)
         for number in range(first, min(first + BLOCK, count)):
-            goals = free_poses(loop, rng)
+            goals = free_poses(loop, rng, is_narrow)
             goal, walker = next(goals), ""
             for _ in range(TRIES if number % 2 else 0):
                 if walker := send_somebody(loop, goal, rng):
