@@ -14,12 +14,12 @@ CODE = """
 import threading
 import numpy as np
 from pathlib import Path
-from rosbot_patrol.ros.runtime.process import give_back_large_blocks
+from rosbot_patrol.ros.runtime.process import give_back_memory
 
 def megabytes():
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4 // 1024
 
-assert give_back_large_blocks()
+assert give_back_memory()
 cells = np.ones(12_250_000, np.uint8)
 before = megabytes()
 

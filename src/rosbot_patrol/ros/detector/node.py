@@ -47,7 +47,6 @@ from rosbot_patrol.ros.detector.standby import Standby
 from rosbot_patrol.ros.messages.images import picture_to_msg
 from rosbot_patrol.ros.runtime import diagnostics
 from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node
-from rosbot_patrol.ros.runtime.process import share_one_heap
 
 log = logging.getLogger(__name__)
 
@@ -58,7 +57,6 @@ CONSOLE_REPEAT = 10.0
 
 def main() -> None:
     """Run the node."""
-    share_one_heap()
     run_node("darknet_ros", _body)
 
 

@@ -34,7 +34,6 @@ from rosbot_patrol.ros.detector.camera import Camera
 from rosbot_patrol.ros.messages.images import picture_to_msg
 from rosbot_patrol.ros.runtime import diagnostics
 from rosbot_patrol.ros.runtime.node import load_params, run_node
-from rosbot_patrol.ros.runtime.process import share_one_heap
 from rosbot_patrol.ros.runtime.reconfigure import ReconfigureServer
 from rosbot_patrol.tunable import changed
 
@@ -67,7 +66,6 @@ class RepublishParams:
 
 def main() -> None:
     """Run the node."""
-    share_one_heap()
     run_node("image_republisher", _body, anonymous=True)
 
 

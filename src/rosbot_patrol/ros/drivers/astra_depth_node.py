@@ -23,7 +23,6 @@ from rosbot_patrol.ros.messages.camera_info import calibration_to_msg
 from rosbot_patrol.ros.messages.images import picture_to_msg
 from rosbot_patrol.ros.runtime import diagnostics
 from rosbot_patrol.ros.runtime.node import load_params, run_node
-from rosbot_patrol.ros.runtime.process import share_one_heap
 
 log = logging.getLogger(__name__)
 
@@ -111,5 +110,4 @@ def _body() -> None:
 
 def main() -> None:
     """Run the node."""
-    share_one_heap()
     run_node("astra_depth", _body)

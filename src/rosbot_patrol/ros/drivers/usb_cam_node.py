@@ -38,7 +38,6 @@ from rosbot_patrol.ros.messages.camera_info import calibration_from_msg, calibra
 from rosbot_patrol.ros.messages.images import picture_to_msg
 from rosbot_patrol.ros.runtime import diagnostics
 from rosbot_patrol.ros.runtime.node import Worker, load_params, ros_home, run_node
-from rosbot_patrol.ros.runtime.process import share_one_heap
 
 log = logging.getLogger(__name__)
 
@@ -215,5 +214,4 @@ def _body() -> None:
 
 def main() -> None:
     """Run the node."""
-    share_one_heap()
     run_node("usb_cam", _body)

@@ -40,7 +40,7 @@ from rosbot_patrol.ros.move_base.plans import ThreadedPlans
 from rosbot_patrol.ros.move_base.tuning import Tuning
 from rosbot_patrol.ros.runtime.logs import LineThrottle
 from rosbot_patrol.ros.runtime.node import Loop, now, run_node
-from rosbot_patrol.ros.runtime.process import Priority, give_back_large_blocks
+from rosbot_patrol.ros.runtime.process import Priority
 from rosbot_patrol.ros.runtime.state_folder import zones_file
 from rosbot_patrol.ros.runtime.transforms import Transforms
 
@@ -245,5 +245,4 @@ class MoveBaseNode:
 
 def main() -> None:
     """Start the node."""
-    give_back_large_blocks()
     run_node("move_base", lambda: MoveBaseNode().run(), priority=Priority.CONTROL)

@@ -20,7 +20,7 @@ from rosbot_patrol.errors import ParamError, PatrolError, StateError
 from rosbot_patrol.files import read_json
 from rosbot_patrol.ros.runtime import greeting, logs, single_links
 from rosbot_patrol.ros.runtime.by_hand import require_master
-from rosbot_patrol.ros.runtime.process import Priority, follow_restart, take
+from rosbot_patrol.ros.runtime.process import Priority, follow_restart, give_back_memory, take
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -57,12 +57,15 @@ def run_node(
     if by_hand:
         require_master(name)
     refused = take(priority)  # before any thread starts: threads inherit it
+    gives_back = give_back_memory()
     greeting.install()
     single_links.install()
     rospy.init_node(name, **init_options)
     logs.install()
     if refused:
         log.info("%s", refused)
+    if not gives_back:
+        log.info("this C library keeps freed memory: the node takes more of it than need be")
     threading.excepthook = _end_with_worker
     ending = _Ending()
     try:
