@@ -56,7 +56,7 @@ def check(args: Sequence[Any], name: str, count: int, arrays: Sequence[Declared]
 
 
 def _opening(signature: str) -> int:
-    """Where the parenthesis of the arguments opens; that of a tuple among the results comes before."""
+    """Index of the parenthesis that opens the arguments; a tuple among the results has parentheses of its own."""
     depth = 0
     for at in range(len(signature) - 1, -1, -1):
         depth += (signature[at] == ")") - (signature[at] == "(")

@@ -86,7 +86,7 @@ def _record(function: Any, signature: str, options: dict[str, Any]) -> Any:
 
 @functools.lru_cache(maxsize=1)
 def _load() -> ModuleType | None:
-    """Load the library; None where there is none that fits these sources and this processor."""
+    """Load the library; returns None if none was compiled for these sources and this processor."""
     path = kernel_library()
     spec = importlib.util.spec_from_file_location(LIBRARY, path)
     if not path.exists() or spec is None or spec.loader is None:
