@@ -61,7 +61,7 @@ def take(priority: Priority) -> str:
 log = logging.getLogger(__name__)
 
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # of mallopt(3)
-LARGE = 128 << 10  # [bytes], where glibc begins
+LARGE = 1 << 20  # [bytes]; more than a picture, which would else be mapped anew each time
 
 
 def give_back_memory() -> bool:
@@ -70,7 +70,7 @@ def give_back_memory() -> bool:
     Otherwise glibc gives threads heaps of their own, and each keeps the most it has ever used; Python's lock keeps
     threads from waiting for each other in the one heap. And it raises the size of the blocks that it returns at once
     from 128 kB to 32 MB by itself: copies of a costmap of 12 million cells took 600 MB. Nine nodes of a patrol took
-    633 MB for 708, and 7 % less processor time. Returns False if the C library does not support it.
+    649 MB for 708, and 7 % less processor time. Returns False if the C library does not support it.
     """
     return all(
         [
