@@ -100,7 +100,7 @@ def _outline(cut: Slice, step: float) -> NDArray[np.float64]:
 
 
 def narrow_cells(world: World, info: GridInfo) -> NDArray[np.bool_]:
-    """Cells of a map whose centre is nearer than WAY to an obstacle of the true world, shape (H, W)."""
+    """Find the cells of a map that are nearer than WAY to an obstacle of the true world; shape (H, W)."""
     step = info.resolution / FINE
     points = np.concatenate([_outline(slice_bodies(world.bodies, height), step) for height in HEIGHTS])
     ix, iy = np.floor((points - (info.origin_x, info.origin_y)).T / step).astype(int)
