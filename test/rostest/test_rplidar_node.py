@@ -152,6 +152,16 @@ def test_unplugged_and_plugged_in_again(ros, listener, tmp_path):
     assert node.popen.poll() is None
 
 
+def test_a_device_that_appears_after_the_node_is_waited_for(ros, listener, tmp_path):
+    lidar = Lidar(ros, tmp_path, "A2")
+    lidar.order("unplug")
+    node = lidar.node("_wait_for_port:=60")
+    node.says(f"{lidar.port} is not there: waiting up to 60 s for it")
+    listener.says(f"waiting for {lidar.port}")
+    lidar.order("plug_in")
+    wait_for(lambda: len(scans(listener)) > 1, what="scans")
+
+
 def test_a_motor_that_stalls_is_told_and_started_again(ros, listener, tmp_path):
     lidar = Lidar(ros, tmp_path, "A2")
     node = lidar.node()

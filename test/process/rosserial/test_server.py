@@ -23,7 +23,7 @@ from rosbot_patrol.rosserial.protocol.topics import (
 )
 from rosbot_patrol.rosserial.server.admission import Limits
 from rosbot_patrol.rosserial.server.policy import TRUSTED, Policy
-from rosbot_patrol.rosserial.server.server import SerialServer
+from rosbot_patrol.rosserial.server.server import TICK, SerialServer
 
 ESP = TopicInfo(topic_id=125, name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=ESP_TRIGGER_MD5)
 ANNOUNCE = encode(TopicId.PUBLISHER, pack_topic_info(ESP))
@@ -285,15 +285,23 @@ def test_serial_device_over_a_pseudo_terminal():
     server.close()
 
 
-def test_missing_serial_device_is_said_and_tried_again(caplog):
-    now = [0.0]
+def test_missing_serial_device_is_said_once_and_opened_when_it_appears(caplog, tmp_path):
+    caplog.set_level("INFO")
+    now, device = [0.0], tmp_path / "base"
     server = SerialServer(Recorder(), TRUSTED, clock=lambda: now[0])
-    server.attach("/dev/no-such-device", 57600)
+    server.attach(str(device), 57600)
     for now[0] in (0.0, 1.0, 4.0, 8.0):
         server.poll(0.0)
-    assert len(caplog.records) == 1
-    assert "/dev/no-such-device" in caplog.text
+    assert [record.levelname for record in caplog.records] == ["ERROR"]
+    assert f"{device}'; it is opened once it is there" in caplog.text
+    main, other = pty.openpty()
+    device.symlink_to(os.ttyname(other))
+    now[0] += TICK
+    server.poll(0.0)
+    assert f"connected to {device} at 57600 baud" in caplog.text
     server.close()
+    os.close(main)
+    os.close(other)
 
 
 KEYS = {2: bytes(range(32)), 3: bytes(range(1, 33))}

@@ -9,6 +9,7 @@ Differs:
 - One that does not answer is explained: no permission, another program, another speed, a scan that does not stop.
 - STOP is sent before the motor ends, and both at the end of the node, SIGTERM included.
 - `~auto_standby` stops the motor while nobody listens.
+- `~wait_for_port`: time that the serial device may take to appear at the start, before the node gives up.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import sys
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import rospy
@@ -42,7 +44,7 @@ log = logging.getLogger(__name__)
 UPSTREAM_EXIT = 255
 _SILENT = 2.0  # [s] without a turn, as upstream waits for one
 _PAUSES = (0.5, 1.0, 2.0, 5.0)  # [s] before the next try to open it
-_IDLE = 0.1  # [s] between two looks while the motor is off
+_IDLE = 0.1  # [s] between two looks while the motor is off, or for a device that is not there yet
 _REPORT = 1.0  # [s]
 
 
@@ -60,6 +62,9 @@ class RplidarParams(ChannelParams):
     )
     initial_reset: bool = param(False, doc="reset the lidar first")
     auto_standby: bool = param(False, doc="stop the motor while nobody listens to the scans")
+    wait_for_port: float = param(
+        0.0, unit="s", lo=0.0, doc="time for the serial device to appear at the start; without it, the node ends"
+    )
 
     @property
     def turns_per_second(self) -> float:
@@ -97,6 +102,7 @@ class RplidarNode:
     def run(self) -> int:
         """Serve until shutdown; returns the exit status."""
         tries = 0
+        self._await_port()
         while not rospy.is_shutdown():
             try:
                 lidar, info = self._open()
@@ -122,6 +128,16 @@ class RplidarNode:
         return 0
 
     # -- opening
+
+    def _await_port(self) -> None:
+        p = self._params
+        until = time.monotonic() + p.wait_for_port
+        if p.channel_type != "serial" or not p.wait_for_port or Path(p.serial_port).exists():
+            return
+        log.warning("%s is not there: waiting up to %g s for it", p.serial_port, p.wait_for_port)
+        self._tell(diagnostics.WARN, f"waiting for {p.serial_port}")
+        while not (rospy.is_shutdown() or Path(p.serial_port).exists() or time.monotonic() > until):
+            self._wait(_IDLE)
 
     def _open(self) -> tuple[Lidar, DeviceInfo]:
         p = self._params

@@ -98,7 +98,7 @@ class SerialServer:
         return [listener.getsockname()[1] for listener in self._listeners]
 
     def attach(self, path: str, baud: int) -> None:
-        """Serve a serial device; if it is missing, try again every 3 s."""
+        """Serve a serial device: at once when it appears, and every 3 s while it cannot be opened."""
         self._serial = (path, baud)
 
     def run(self) -> None:
@@ -203,8 +203,12 @@ class SerialServer:
         try:
             port = SerialPort(path, baud)
         except OSError as err:
+            is_absent = isinstance(err, FileNotFoundError)
+            if is_absent:
+                self._serial_due = now
             if self.journal.is_new("serial", now):
-                log.error("%s; trying again every %.0f s", err, REOPEN_PERIOD)
+                then = "it is opened once it is there" if is_absent else f"trying again every {REOPEN_PERIOD:.0f} s"
+                log.error("%s; %s", err, then)
             return
         log.info("connected to %s at %d baud", path, baud)
         session = Session(self._policy, now, silence_timeout=None)
