@@ -7,7 +7,8 @@
   samples a second: frames, samples, turns, layout, without ROS.
 - scan_latency_ms, rplidar_cpu_percent, rplidar_mb: the node rplidarNode with an emulated A2 (8,000 samples a second) on
   a pseudo-terminal. Latency: from the bytes that end a turn, handed to the terminal, to the message in a subscriber;
-  median.
+  median. scan_latency_decodable_ms: from the next frame on, which comes 4 ms later and has the angle that the turn's
+  last frame ends at; without it, no driver can know the turn.
 - mjpeg_pass_cpu_percent, mjpeg_decode_cpu_percent, camera_mb: the node usb_cam_node with a network camera that sends
   JPEGs of 640 x 480 and 50 kB, 30 a second: while only `compressed` has a subscriber, and while both have one.
 - hardware_realtime_factor, hardware_ready_s, robot_profile_mb, robot_profile_cores: `simulation:=hardware` on a mission
@@ -105,12 +106,19 @@ def decoding(model: str, seconds: float) -> float:
 
 
 class Stamped(RplidarDevice):
-    """An emulated lidar that remembers when it handed over the frame in which each turn ends."""
+    """An emulated lidar that remembers when it handed over the frame in which each turn ends, and the next one."""
+
+    def __init__(self, model: str) -> None:
+        super().__init__(MODELS[model], room)
+        self.ended: list[float] = []
+        self.decodable: list[float] = []
 
     def stream(self, now: float) -> bytes:
         """Frames that are due."""
         before = self._angle
         data = super().stream(now)
+        if data and len(self.decodable) < len(self.ended):
+            self.decodable.append(time.monotonic())
         if data and self._angle < before:
             self.ended.append(time.monotonic())
         return data
@@ -143,8 +151,7 @@ def node(seconds: float) -> dict[str, float]:
 
     with tempfile.TemporaryDirectory() as folder:
         line = SerialLine(Path(folder) / "rplidar")
-        device = Stamped(MODELS["A2"], room)
-        device.ended = []
+        device = Stamped("A2")
         running = [True]
         threading.Thread(target=serve, args=(device, line, lambda: running[0]), daemon=True).start()
         heard: list[float] = []
@@ -158,9 +165,14 @@ def node(seconds: float) -> dict[str, float]:
         finally:
             running[0] = False
             end_group(process)
-        late = [min((each - end for end in device.ended if end <= each), default=9.0) for each in heard[5:]]
+
+        def late(since: list[float]) -> float:
+            """Median time from the last of these moments to a scan [ms]."""
+            return 1e3 * statistics.median(each - max(end for end in since if end <= each) for each in heard[5:])
+
         return {
-            "scan_latency_ms": 1e3 * statistics.median(late),
+            "scan_latency_ms": late(device.ended),
+            "scan_latency_decodable_ms": late(device.decodable),
             "rplidar_cpu_percent": cpu,
             "rplidar_mb": memory,
         }

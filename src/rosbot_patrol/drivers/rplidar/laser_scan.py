@@ -75,13 +75,15 @@ class _Cells:
             cell: for each sample.
             off: distance of each from the middle of that cell [cells].
         """
-        ranges = np.where(turn.distance > 0.0, turn.distance, math.inf)
-        order = np.lexsort((ranges, off))[::-1]
-        cell, off = cell[order] % len(self.ranges), off[order]
-        is_nearer = off < self._off[cell]
-        cell, order = cell[is_nearer], order[is_nearer]
-        self.ranges[cell], self.intensities[cell] = ranges[order], turn.quality[order] >> 2
-        self._off[cell] = off[is_nearer]
+        cell = cell % len(self.ranges)
+        nearer = np.flatnonzero(off < self._off[cell])
+        cell, off = cell[nearer], off[nearer]
+        ranges = turn.distance[nearer]
+        ranges[ranges <= 0.0] = math.inf
+        order = np.lexsort((ranges, off))[::-1]  # the last one written to a cell stays there
+        cell = cell[order]
+        self.ranges[cell], self.intensities[cell] = ranges[order], turn.quality[nearer[order]] >> 2
+        self._off[cell] = off[order]
 
 
 def upstream_angles(turn: Turn, cells_wanted: int, *, inverted: bool = False, compensate: bool = True) -> Layout | None:
