@@ -79,6 +79,20 @@ def test_parses(path: Path) -> None:
     check_programs(config)
 
 
+def test_a_turtlebot3_has_its_own_drivers_size_and_speed() -> None:
+    guard = parse(ROOT / "launch" / "rosbot_patrol.launch", "robot:=turtlebot3_burger", robot=True)
+    assert {"hlds_laser_publisher", "base_adapter", "serial_node", "camera_driver"} <= set(names(guard))
+    assert not {"rplidarNode", "rosbot_ekf", "msgs_conversion"} & set(names(guard))
+    values = {name: param.value for name, param in guard.params.items()}
+    assert values["/move_base/local_costmap/footprint"] == values["/move_base/global_costmap/footprint"]
+    assert values["/move_base/local_costmap/footprint"][0] == [0.041, 0.105]
+    assert values["/move_base/TrajectoryPlannerROS/max_vel_x"] == 0.2
+    assert values["/twist_mux/collision_guard/half_width"] == 0.105
+    assert values["/patrolling_node/battery_topic"] == "battery_state"
+    with pytest.raises(roslaunch.core.RLException, match="simulation-hardware-emulates-a-rosbot-not-turtlebot3_waffle"):
+        parse(ROOT / "launch" / "rosbot_patrol.launch", "robot:=turtlebot3_waffle", "simulation:=hardware")
+
+
 def test_image_transports_republish_is_ours() -> None:
     """As the tutorial's launch files name it; Debian's knows no compressed transport."""
     first = roslib.packages.find_node("image_transport", "republish")[0]
