@@ -61,6 +61,34 @@ rospy.spin()
 """
 
 
+CLOCK = """
+import json, sys, threading, time
+import rospy
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+rospy.init_node("clock", anonymous=True)
+clock, wheels = rospy.Publisher("/clock", Clock, queue_size=1), rospy.Publisher("wheels", Odometry, queue_size=5)
+def hear(m):
+    print(json.dumps({"x": m.pose.pose.position.x, "stamp": m.header.stamp.to_sec()}), flush=True)
+rospy.Subscriber("odometry/filtered", Odometry, hear)
+now = [100.0]
+def listen():
+    for line in sys.stdin:
+        now[0] = float(line)
+threading.Thread(target=listen, daemon=True).start()
+print(json.dumps({"ready": True}), flush=True)
+while not rospy.is_shutdown():
+    now[0] += 0.05
+    stamp = rospy.Time.from_sec(now[0])
+    clock.publish(stamp)
+    m = Odometry(child_frame_id="base_link")
+    m.header.stamp, m.header.frame_id, m.pose.pose.orientation.w, m.twist.twist.linear.x = stamp, "odom", 1.0, 0.5
+    m.twist.covariance = [0.001 if i % 7 == 0 else 0.0 for i in range(36)]
+    wheels.publish(m)
+    time.sleep(0.05)
+"""
+
+
 class Filter:
     """The node, and a peer that plays the sensors."""
 
@@ -227,3 +255,26 @@ def test_the_transform_is_the_one_that_is_wanted(ros, arguments, frames):
         assert not [said for said in ekf.peer.heard() if "tf" in said]
     else:
         ekf.peer.expect(lambda said: said.get("tf") == frames)
+
+
+@pytest.mark.parametrize("resets", [True, False])
+def test_time_that_goes_back_begins_anew_if_that_is_wanted(ros, resets):
+    """As between two runs of a bag, with its clock."""
+    ros.set_param("/use_sim_time", True)
+    try:
+        ekf = Filter(ros, *WHEELS, f"_reset_on_time_jump:={str(resets).lower()}")
+        clock = ros.script(CLOCK)
+        first = clock.expect(lambda said: said.get("x", 0.0) > 0.5)
+        assert first["stamp"] > 100.0
+        clock.process.popen.stdin.write("20.0\n")
+        clock.process.popen.stdin.flush()
+        if resets:
+            ekf.node.says("ROS time went back by")
+            again = clock.expect(lambda said: said.get("stamp", 100.0) < 30.0)
+            assert again["x"] < 0.3
+            clock.expect(lambda said: said.get("stamp", 100.0) < 30.0 and said["x"] > again["x"] + 0.2)
+        else:
+            ekf.peer.expect(lambda said: "its stamps have gone back" in said.get("text", ""))
+            assert not [said for said in clock.heard() if said.get("stamp", 100.0) < 30.0]
+    finally:
+        ros.forget("/use_sim_time")

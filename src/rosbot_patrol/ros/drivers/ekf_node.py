@@ -275,6 +275,8 @@ def _judge(silent: float, counts: Counts, before: Counts) -> tuple[int, str]:
         return ERROR, "was never heard"
     if silent > _SILENT:
         return WARN, f"silent for {silent:.1f} s"
+    if counts.late > before.late and counts.taken == before.taken:
+        return WARN, "its stamps have gone back: readings older than the last do not count (reset_on_time_jump)"
     if counts.spoilt > before.spoilt:
         return WARN, "it sends numbers that are not finite: they do not count"
     if counts.unspread > before.unspread:
