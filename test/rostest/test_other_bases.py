@@ -173,4 +173,4 @@ def test_the_lds_of_a_turtlebot3(ros, base, tmp_path):
     lidar.popen.stdin.write("unplug\n")
     lidar.popen.stdin.flush()
     node.says("the lidar is lost, and will be opened again")
-    base.process.says("cannot be opened: No such file or directory")
+    base.process.says(f"{port} is not there: plug the lidar in, or set port")

@@ -293,7 +293,8 @@ def test_missing_serial_device_is_said_once_and_opened_when_it_appears(caplog, t
     for now[0] in (0.0, 1.0, 4.0, 8.0):
         server.poll(0.0)
     assert [record.levelname for record in caplog.records] == ["ERROR"]
-    assert f"{device}'; it is opened once it is there" in caplog.text
+    assert f"{device} is not there: plug the board in, or set port" in caplog.text
+    assert "it is opened once it is there" in caplog.text
     main, other = pty.openpty()
     device.symlink_to(os.ttyname(other))
     now[0] += TICK

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -13,6 +11,7 @@ from rosbot_patrol.drivers.rplidar.lidar import Channel, Lidar
 from rosbot_patrol.drivers.rplidar.protocol import AnswerType
 from rosbot_patrol.errors import DeviceError
 from rosbot_patrol.params import param
+from rosbot_patrol.rosserial.server.serial_port import why_closed
 
 _FEW = 3  # frames that show a running scan
 
@@ -50,7 +49,10 @@ def open_channel(params: ChannelParams) -> Channel:
             return UdpChannel(params.udp_ip, params.udp_port)
         return SerialChannel(params.serial_port, params.serial_baudrate)
     except OSError as err:
-        raise DeviceError(params.where, _why_closed(params, err)) from err
+        if params.channel_type != "serial":
+            raise DeviceError(params.where, f"cannot be reached: {err}") from err
+        why = why_closed(params.serial_port, err, device="the lidar", parameter="serial_port")
+        raise DeviceError(params.where, why) from err
 
 
 def why_silent(
@@ -74,23 +76,6 @@ def why_silent(
         if baud != params.serial_baudrate and _answers(params.serial_port, baud, open_at):
             return f"it answers at {baud} baud: set serial_baudrate to {baud}"
     return f"{_what_came(heard)}: look at its power, its cable, and whether {params.serial_port} is the lidar"
-
-
-def _why_closed(params: ChannelParams, err: OSError) -> str:
-    port = params.serial_port
-    if params.channel_type != "serial":
-        return f"cannot be reached: {err}"
-    if err.errno == errno.EACCES:
-        return f"may not be opened by this user: add it to the group of {port} (sudo adduser {_user()} dialout)"
-    if err.errno in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
-        return f"{port} is not there: plug the lidar in, or set serial_port (ls /dev/serial/by-id)"
-    if err.errno in (errno.EBUSY, errno.EWOULDBLOCK):
-        return f"another program uses {port}: end it first (fuser {port} tells which)"
-    return str(err)
-
-
-def _user() -> str:
-    return os.environ.get("USER", "USER")
 
 
 def _what_came(heard: bytes) -> str:

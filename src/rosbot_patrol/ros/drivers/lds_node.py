@@ -22,6 +22,7 @@ from rosbot_patrol.params import param
 from rosbot_patrol.ros.runtime import diagnostics
 from rosbot_patrol.ros.runtime.node import load_params, run_node
 from rosbot_patrol.ros.runtime.process import Priority
+from rosbot_patrol.rosserial.server.serial_port import why_closed
 
 log = logging.getLogger(__name__)
 
@@ -56,7 +57,7 @@ class LdsNode:
             try:
                 channel = SerialChannel(self._params.port, self._params.baud_rate)
             except OSError as err:
-                self._lost(f"{self._params.port} cannot be opened: {err.strerror or err}")
+                self._lost(why_closed(self._params.port, err, device="the lidar", parameter="port"))
                 self._pause(_PAUSES[min(tries, len(_PAUSES) - 1)])
                 tries += 1
                 continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import struct
@@ -19,6 +20,25 @@ def _set_speed(fd: int, baud: int) -> None:
     fields[2] = (fields[2] & ~_CBAUD) | _BOTHER | termios.CLOCAL | termios.CREAD
     fields[6] = fields[7] = baud
     fcntl.ioctl(fd, _TCSETS2, _TERMIOS2.pack(*fields))
+
+
+def why_closed(path: str, err: OSError, *, device: str, parameter: str) -> str:
+    """Why a serial device could not be opened, and what to do.
+
+    Args:
+        path: of the device.
+        err: of the attempt.
+        device: what should be plugged in there, such as "the lidar".
+        parameter: name of the parameter with the path.
+    """
+    if err.errno in (errno.EACCES, errno.EPERM):
+        user = os.environ.get("USER", "USER")
+        return f"{path} may not be opened by this user: sudo adduser {user} dialout, then log in again"
+    if err.errno in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
+        return f"{path} is not there: plug {device} in, or set {parameter} (ls /dev/serial/by-id)"
+    if err.errno in (errno.EBUSY, errno.EWOULDBLOCK):
+        return f"another program uses {path}: end it first (fuser {path} tells which)"
+    return str(err)
 
 
 class SerialPort:

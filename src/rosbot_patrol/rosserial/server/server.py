@@ -20,7 +20,7 @@ from rosbot_patrol.rosserial.server.client import Client, Link, listen, peer_nam
 from rosbot_patrol.rosserial.server.dispatch import Dispatcher, Handler
 from rosbot_patrol.rosserial.server.journal import Journal
 from rosbot_patrol.rosserial.server.policy import Policy
-from rosbot_patrol.rosserial.server.serial_port import SerialPort
+from rosbot_patrol.rosserial.server.serial_port import SerialPort, why_closed
 from rosbot_patrol.rosserial.server.session import Session
 
 log = logging.getLogger(__name__)
@@ -208,7 +208,7 @@ class SerialServer:
                 self._serial_due = now
             if self.journal.is_new("serial", now):
                 then = "it is opened once it is there" if is_absent else f"trying again every {REOPEN_PERIOD:.0f} s"
-                log.error("%s; %s", err, then)
+                log.error("%s; %s", why_closed(path, err, device="the board", parameter="port"), then)
             return
         log.info("connected to %s at %d baud", path, baud)
         session = Session(self._policy, now, silence_timeout=None)
