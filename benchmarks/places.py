@@ -8,9 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from rosbot_patrol.campaign.houses.drawn import drawn_house_files
+from rosbot_patrol.campaign.houses.files import HouseFiles, house_files
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.simulation.engine import Engine, EngineParams
+from rosbot_patrol.simulation.plans.catalogue import load_catalogue
 from rosbot_patrol.simulation.render.egl import make_renderer
 from rosbot_patrol.simulation.robot.description import load_robot
 from rosbot_patrol.simulation.sdf.world import World
@@ -18,6 +21,13 @@ from rosbot_patrol.simulation.sdf.world import World
 ROOT = Path(__file__).resolve().parent.parent
 CLASSES = ("person", "fire hydrant")
 LOOKS = ("intruder_test_balaclava", "intruder_test_violet", "intruder_test_orchid")
+
+
+def world_files(name: str, folder: Path) -> HouseFiles:
+    """Files of one of our houses, or of one drawn by chance (drawn_SEED), which is written into a folder."""
+    if not name.startswith("drawn_"):
+        return house_files(name, ROOT)
+    return drawn_house_files(int(name.removeprefix("drawn_")), folder / name, load_catalogue(ROOT / "config"))
 
 
 def make_engine(world: World, figures: str = "plain") -> Engine:

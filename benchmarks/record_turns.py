@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Record turns of the robot for the benchmark of the intruder decision: boxes of several networks, poses, truth.
 
-    python3 benchmarks/record_turns.py FILE.jsonl.gz [--worlds house,office] [--scenes N] [--seed N]
-        [--figures detailed] [--network NAME=CFG,WEIGHTS[,NAMES]]...
+    python3 benchmarks/record_turns.py FILE.jsonl.gz [--worlds house,drawn_2000001] [--scenes N] [--seed N]
+        [--figures detailed] [--network NAME]...
+
+A world is one of our houses, or drawn_SEED, drawn by chance. A network is what `network:=NAME` names.
 
 Each scene is one place of the robot and one subject: nobody, a person, a person in the dark, a half hidden person, a
 dog, a cat or a poster. The robot turns once with a picture every 4.3 degrees, as at 10 Hz, and then looks at the
@@ -20,6 +22,7 @@ import gzip
 import json
 import math
 import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -27,10 +30,11 @@ from typing import IO, Any
 
 import cv2
 import numpy as np
-from person_place import HOUSES
-from places import LOOKS, draw_places, is_inside, make_engine
+from places import LOOKS, draw_places, is_inside, make_engine, world_files
 
-from rosbot_patrol.detection.detector import DarknetDetector, load_detector
+from rosbot_patrol.campaign.houses.files import HouseFiles
+from rosbot_patrol.detection.choice import open_network
+from rosbot_patrol.detection.detector import Detector
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, transform_points
 from rosbot_patrol.images.encodings import Picture
@@ -44,8 +48,6 @@ from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.scene.matrices import from_pose2d
 from rosbot_patrol.simulation.sdf.world import load_world
 
-ROOT = Path(__file__).resolve().parent.parent
-MODEL = ROOT / "models" / "house"
 KINDS = ("nobody", "person", "hidden", "dark", "nobody", "person", "dog", "poster", "cat", "hidden")
 STEP_DEG = 4.3  # of a turn at 0.75 rad/s, ten pictures a second
 PERIOD = 0.1  # between two pictures [s]
@@ -59,15 +61,15 @@ class Stage:
     """One world with its robot, its floor and the networks.
 
     Args:
-        world: of HOUSES.
+        files: of the world.
         networks: by name.
         figures: plain or detailed people.
     """
 
-    def __init__(self, world: str, networks: dict[str, DarknetDetector], figures: str) -> None:
-        self.world, self.networks = world, networks
-        self.engine: Engine = make_engine(load_world(ROOT / "worlds" / f"{world}.world"), figures)
-        self.floor: Floor = floor_of(read_map(ROOT / "maps" / f"{HOUSES[world]}_map.yaml"))
+    def __init__(self, files: HouseFiles, networks: dict[str, Detector], figures: str) -> None:
+        self.world, self.networks = files.name, networks
+        self.engine: Engine = make_engine(load_world(files.world), figures)
+        self.floor: Floor = floor_of(read_map(files.map))
         k = self.engine.params.camera.intrinsics
         self.lens = Lens(fx=k.fx, fy=k.fy, cx=k.cx, cy=k.cy, width=k.width, height=k.height)
 
@@ -267,27 +269,19 @@ def draw_looks(
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", type=Path)
-    parser.add_argument("--worlds", default="house,office", help="of " + ", ".join(HOUSES))
+    parser.add_argument("--worlds", default="house,office")
     parser.add_argument("--scenes", type=int, default=20, help="in each world")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--figures", choices=("plain", "detailed"), default="plain")
-    parser.add_argument("--network", action="append", default=[], metavar="NAME=CFG,WEIGHTS[,NAMES]")
+    parser.add_argument("--network", action="append", default=[], metavar="NAME", help="besides house")
     arguments = parser.parse_args()
-    networks = {
-        "house": load_detector(f"{MODEL}.cfg", f"{MODEL}.weights", ["person", "fire hydrant"], threshold=LOWEST)
-    }
-    for given in arguments.network:
-        name, files = given.split("=", 1)
-        cfg, weights, *names = files.split(",")
-        listed = Path(names[0]).read_text(encoding="utf-8").split("\n") if names else []
-        networks[name] = load_detector(cfg, weights, [n.strip() for n in listed if n.strip()], threshold=LOWEST)
+    networks = {name: open_network(name, LOWEST).detector for name in ("house", *arguments.network)}
     rng, number = np.random.default_rng(arguments.seed), 1000 * arguments.seed
-    with gzip.open(arguments.file, "wt", encoding="utf-8") as file:
+    with gzip.open(arguments.file, "wt", encoding="utf-8") as file, tempfile.TemporaryDirectory() as folder:
         for world in arguments.worlds.split(","):
-            stage = Stage(world, networks, arguments.figures)
-            kinds = (KINDS[i % len(KINDS)] for i in range(arguments.scenes))
-            places = draw_places(stage.engine, rng, arguments.scenes)
-            for kind, place in zip(kinds, places, strict=True):
+            stage = Stage(world_files(world, Path(folder)), networks, arguments.figures)
+            for place in draw_places(stage.engine, rng, arguments.scenes):
+                kind = KINDS[number % len(KINDS)]
                 number += 1
                 is_there = Recorder(file, stage, rng, number).record(kind, place)
                 sys.stderr.write(f"{world} {number} {kind}{'' if is_there else ': no room'}\n")

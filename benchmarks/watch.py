@@ -17,12 +17,13 @@ import in_workspace  # first: it finds the interpreter
 import argparse
 import json
 import math
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from person_place import HOUSES
+from places import world_files
 
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.maps.map_io import read_map
@@ -35,7 +36,6 @@ from rosbot_patrol.patrol.records.inputs import Frame
 from rosbot_patrol.patrol.records.mission import Verdict
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
-ROOT = Path(__file__).resolve().parent.parent
 LOOKS_MOST = 4
 SAME = 1.5  # a confirmation this near to the person is of them [m]
 FAR, ASIDE = 4.0, 0.1  # or in their direction, at a wrong distance [m], [rad]
@@ -215,7 +215,9 @@ def main() -> None:
     calibrations = {n: read_calibration(Path(f)) for n, f in (given.split("=", 1) for given in arguments.calibration)}
     scenes = [scene for path in arguments.records for scene in read_scenes(path)]
     in_workspace.require_figures(scenes, "the records hold no scene")
-    floors = {w: floor_of(read_map(ROOT / "maps" / f"{HOUSES[w]}_map.yaml")) for w in {s.world for s in scenes}}
+    with tempfile.TemporaryDirectory() as folder:
+        worlds = {scene.world for scene in scenes}
+        floors = {world: floor_of(read_map(world_files(world, Path(folder)).map)) for world in worlds}
     figures: dict[str, float] = {}
     for network in scenes[0].looks[0].frames:
         fitted = calibrations.get(network)

@@ -16,9 +16,10 @@ from pathlib import Path
 from rosbot_patrol.detection.catalogue import CATALOGUE, REAL_CAMERA, check_file
 from rosbot_patrol.detection.detector import Detector, load_detector
 from rosbot_patrol.detection.identity import network_sum
-from rosbot_patrol.detection.params import DarknetParams
+from rosbot_patrol.detection.params import DarknetParams, Threshold
 from rosbot_patrol.detection.quality import describe_quality
 from rosbot_patrol.detection.second_opinion import UNSURE, WEAK, SecondOpinion
+from rosbot_patrol.detection.ssd.model_file import GRAPH_SHA256
 from rosbot_patrol.errors import DetectorError, ParamError
 from rosbot_patrol.package_files import package_file, package_folder
 from rosbot_patrol.params import load, unknown_name
@@ -30,6 +31,8 @@ REAL_CAMERAS = (REAL_CAMERA, "ssdlite")
 """Networks that `auto` tries, the best one first."""
 DOWNLOAD = f"rosrun rosbot_patrol download_weights {REAL_CAMERA}"
 INSTALL = "scripts/bootstrap --robot"
+_SUMS = {"ssdlite": GRAPH_SHA256}
+"""Sums of networks that come with a package."""
 _MODULES = {"hog": ("hog", "HogDetector"), "ssdlite": ("ssdlite", "load_ssdlite")}
 
 
@@ -84,15 +87,19 @@ def choose_detector(params: DarknetParams, folders: NetworkFolders) -> Choice:
     return choice
 
 
-def open_network(name: str) -> Choice:
+def open_network(name: str, threshold: float = 0.0) -> Choice:
     """Make the detector that `network:=NAME` makes, from the files of the installed packages.
+
+    Args:
+        name: of the network.
+        threshold: of its boxes; 0: as its settings say.
 
     Raises:
         DetectorError: as `choose_detector`.
         ParamError: likewise, or there is no network of this name.
     """
     folders = NetworkFolders(own=package_file("models"), darknet=package_folder("darknet_ros"))
-    return choose_detector(network_settings(name, DarknetParams(), folders), folders)
+    return choose_detector(_with_threshold(network_settings(name, DarknetParams(), folders), threshold), folders)
 
 
 def network_settings(name: str, params: DarknetParams, folders: NetworkFolders) -> DarknetParams:
@@ -126,6 +133,7 @@ def _choose_ready(params: DarknetParams, folders: NetworkFolders) -> Choice:
             config_path=params.config_path or settings.config_path,
             weights_path=params.weights_path or settings.weights_path,
         )
+        settings = _with_threshold(settings, params.yolo_model.threshold.value)
         try:
             _check_download(name, settings, folders)
             choice = _load(settings, folders)
@@ -141,6 +149,12 @@ def _choose_ready(params: DarknetParams, folders: NetworkFolders) -> Choice:
     )
 
 
+def _with_threshold(params: DarknetParams, threshold: float) -> DarknetParams:
+    """The same with a threshold; 0: unchanged."""
+    model = dataclasses.replace(params.yolo_model, threshold=Threshold(value=threshold))
+    return dataclasses.replace(params, yolo_model=model) if threshold else params
+
+
 def _check_download(name: str, settings: DarknetParams, folders: NetworkFolders) -> None:
     """Check that a network's downloaded files are whole; DetectorError with what is wrong with one."""
     if name in CATALOGUE:
@@ -151,14 +165,14 @@ def _check_download(name: str, settings: DarknetParams, folders: NetworkFolders)
 
 def _load(params: DarknetParams, folders: NetworkFolders) -> Choice:
     """Load the network of these settings, and the one for a second opinion."""
-    threshold = params.yolo_model.threshold.value
+    threshold = params.threshold
     if not params.second_opinion:
         return _choice(_make(params, folders, threshold), params, folders)
     network = _name(params, folders)
     other = network_settings(params.second_opinion, params, folders)
     if other.network == "auto":
         raise ParamError("second_opinion", "is auto, expected the name of a network")
-    other_threshold = other.yolo_model.threshold.value
+    other_threshold = other.threshold
     try:
         if params.second_opinion == network:
             raise DetectorError("it is the first network already")
@@ -180,9 +194,9 @@ def _name(params: DarknetParams, folders: NetworkFolders) -> str:
 def _choice(detector: Detector, params: DarknetParams, folders: NetworkFolders) -> Choice:
     """A detector with what is known of its network, whose files could be loaded."""
     has_files = params.network not in _MODULES
-    sha256 = network_sum(*map(Path, params.network_files(str(folders.own)))) if has_files else ""
-    threshold = params.yolo_model.threshold.value
-    return Choice(detector=detector, network=_name(params, folders), sha256=sha256, threshold=threshold)
+    files = map(Path, params.network_files(str(folders.own))) if has_files else ()
+    sha256 = network_sum(*files) if has_files else _SUMS.get(params.network, "")
+    return Choice(detector=detector, network=_name(params, folders), sha256=sha256, threshold=params.threshold)
 
 
 def _make(params: DarknetParams, folders: NetworkFolders, threshold: float) -> Detector:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from rosbot_patrol.params import param
 
+_THRESHOLD = 0.3
+
 
 @dataclass(frozen=True, kw_only=True)
 class CameraTopic:
@@ -95,7 +97,12 @@ class FileName:
 class Threshold:
     """Threshold of detections."""
 
-    value: float = param(0.3, lo=0.0, hi=1.0, doc="minimum objectness, and minimum probability of a class")
+    value: float = param(
+        0.0,
+        lo=0.0,
+        hi=1.0,
+        doc="minimum objectness, and minimum probability of a class; 0: what auto takes says it, otherwise 0.3",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,6 +159,11 @@ class DarknetParams:
     frozen_timeout: float = param(
         10.0, unit="s", lo=0.0, doc="time of unchanging images after which the camera counts as frozen; 0: never"
     )
+
+    @property
+    def threshold(self) -> float:
+        """The threshold that counts."""
+        return self.yolo_model.threshold.value or _THRESHOLD
 
     def network_files(self, own_models: str) -> tuple[str, str]:
         """Paths of cfg and weights; without any folder, of our own network in `own_models`."""

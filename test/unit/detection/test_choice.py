@@ -16,8 +16,9 @@ from rosbot_patrol.detection.choice import NetworkFolders, choose_detector, netw
 from rosbot_patrol.detection.darknet.cfg import parse_cfg
 from rosbot_patrol.detection.darknet.random_weights import random_weights
 from rosbot_patrol.detection.darknet.weights import format_weights
-from rosbot_patrol.detection.params import DarknetParams
+from rosbot_patrol.detection.params import DarknetParams, Threshold, YoloModel
 from rosbot_patrol.detection.second_opinion import SecondOpinion
+from rosbot_patrol.detection.ssd.model_file import GRAPH_SHA256
 from rosbot_patrol.errors import DetectorError, ParamError
 
 ROOT = Path(__file__).parents[3]
@@ -101,6 +102,20 @@ def test_auto_takes_ssdlite_where_nothing_was_downloaded(folders, ssdlite, caplo
     cfg = folders.darknet / "yolo_network_config" / "cfg" / f"{REAL_CAMERA}.cfg"
     assert found.passed_over == (f"{REAL_CAMERA} is not ready: {cfg} is not there",)
     assert f"to get it: rosrun rosbot_patrol download_weights {REAL_CAMERA}" in caplog.text
+
+
+def test_auto_keeps_the_threshold_that_the_launch_file_sets(folders, files, ssdlite):
+    """rosbot_patrol.launch sets 0.1, because the patrol weighs weak boxes, too; without it the network's own counts."""
+    low = dataclasses.replace(AUTO, yolo_model=YoloModel(threshold=Threshold(value=0.1)))
+    assert (choose_detector(low, folders).threshold, choose_detector(AUTO, folders).threshold) == (0.1, 0.4)
+    files[1].unlink()
+    assert (choose_detector(low, folders).threshold, choose_detector(AUTO, folders).threshold) == (0.1, 0.5)
+    assert ssdlite == [(0.1, 2), (0.5, 2)]
+
+
+def test_the_network_of_a_package_is_named_by_the_sum_of_its_graph(folders, ssdlite):
+    found = choose_detector(network_settings("ssdlite", DarknetParams(), folders), folders)
+    assert (found.network, found.sha256) == ("ssdlite", GRAPH_SHA256)
 
 
 @pytest.mark.parametrize("which", [0, 1])
