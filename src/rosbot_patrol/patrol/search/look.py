@@ -2,6 +2,8 @@
 
 The turn is measured in odom. Wheels slip, so a full turn may be several degrees off. If the pose in the map (amcl) says
 so, within reason, the rest is turned in addition.
+
+While camera or detector are silent, the turn waits for them: what the robot turns past meanwhile would not be seen.
 """
 
 from __future__ import annotations
@@ -27,7 +29,12 @@ class LookParams:
     camera_timeout: float = param(
         3.0, unit="s", lo=0.1, doc="maximum time without a new camera image during a look that counts"
     )
-    detector_wait: float = param(10.0, unit="s", lo=0.0, doc="longest wait for detector and camera before the turn")
+    detector_wait: float = param(
+        10.0, unit="s", lo=0.0, doc="longest wait for detector and camera before the turn, or within it"
+    )
+    pause_after: float = param(
+        1.0, unit="s", lo=0.1, doc="silence of camera or detector after which the turn waits, up to detector_wait"
+    )
     linger: float = param(1.0, unit="s", lo=0.0, hi=30.0, doc="wait after the turn for the detector's last images")
     correction_min: float = param(
         0.04, unit="rad", lo=0.01, doc="smallest error of the turn, measured in the map, that is corrected"
@@ -87,6 +94,7 @@ class Look:
         self._map_turned = 0.0
         self._turned_at: float | None = None
         self._problem = self._stuck = ""
+        self._silent_since: float | None = None
         self._held_since: float | None = None
         self._held_out_until = -math.inf
 
@@ -107,12 +115,15 @@ class Look:
         if not self._turning:
             blind = self._blind(now, inputs)
             if blind and now - self._began < self.params.detector_wait:
+                self._silent_since = self._began
                 return LookStep(why=f"{Activity.WAITING_TO_TURN.value}: {blind}")
             self._turning, self._turning_since = True, now
-        self._note_blindness(now, inputs)
+        waits = not held and self._waits_for_pictures(now, inputs)
+        if not waits:
+            self._note_blindness(now, inputs)
         self._measure_in_map(inputs.pose)
         spin = self._correction or self.spin
-        step = spin.step(now, inputs.yaw, inputs.clearance, hold=held or self._hold(now, candidate))
+        step = spin.step(now, inputs.yaw, inputs.clearance, hold=held or waits or self._hold(now, candidate))
         if step.done and spin is self.spin and not step.problem and self._is_off():
             self._correction = Spin(abs(self._left()), clockwise=self._left() < 0.0, params=self._spin_params)
         elif step.done:
@@ -164,6 +175,15 @@ class Look:
         if self._needs_camera and now - same > timeout:
             return f"the camera showed the same picture for more than {timeout:g} s of turning"
         return ""
+
+    def _waits_for_pictures(self, now: float, inputs: Inputs) -> bool:
+        """Whether the turn waits, as it is not seen."""
+        last = min(inputs.detector_at, inputs.camera_at) if self._needs_camera else inputs.detector_at
+        if now - last <= self.params.pause_after:
+            self._silent_since = None
+            return False
+        self._silent_since = now if self._silent_since is None else self._silent_since
+        return now - self._silent_since < self.params.detector_wait
 
     def _hold(self, now: float, candidate: bool) -> bool:
         if not candidate or now < self._held_out_until:

@@ -73,6 +73,25 @@ def test_a_hold_ends_by_itself():
     assert 3.0 < still < 6.0
 
 
+@pytest.mark.parametrize("silent", ["camera_at", "detector_at"])
+@pytest.mark.parametrize(("pause", "counts"), [(0.9, True), (6.0, True), (14.0, False)])
+def test_the_turn_waits_for_a_camera_or_detector_that_comes_back(silent, pause, counts):
+    look = Look(LookParams(), SpinParams())
+    yaw = now = turned_unseen = 0.0
+    step = None
+    while step is None or not step.done:
+        last = 4.0 if 4.0 < now < 4.0 + pause else now
+        inputs = Inputs(yaw=wrap_angle(yaw), **{"detector_at": now, "camera_at": now, silent: last})
+        step = look.step(now, inputs, candidate=False)
+        yaw += step.speed * 0.04
+        turned_unseen += step.speed * 0.04 * (last < now)
+        now += 0.04
+    assert (step.problem == "") is counts
+    assert yaw == pytest.approx(math.tau, abs=0.1)
+    if counts:
+        assert turned_unseen < 0.9  # of a camera that sees one radian
+
+
 @pytest.mark.parametrize(
     ("seen_until", "changed_until", "problem"),
     [
