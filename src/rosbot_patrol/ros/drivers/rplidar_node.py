@@ -112,7 +112,7 @@ class RplidarNode:
                     log.error("%s", err.why)
                     return UPSTREAM_EXIT
                 self._tell(diagnostics.ERROR, err.why)
-                self._wait(_PAUSES[min(tries, len(_PAUSES) - 1)])
+                self._pause(_PAUSES[min(tries, len(_PAUSES) - 1)])
                 tries += 1
                 continue
             try:
@@ -131,12 +131,18 @@ class RplidarNode:
 
     def _await_port(self) -> None:
         p = self._params
-        until = time.monotonic() + p.wait_for_port
-        if p.channel_type != "serial" or not p.wait_for_port or Path(p.serial_port).exists():
-            return
-        log.warning("%s is not there: waiting up to %g s for it", p.serial_port, p.wait_for_port)
-        self._tell(diagnostics.WARN, f"waiting for {p.serial_port}")
-        while not (rospy.is_shutdown() or Path(p.serial_port).exists() or time.monotonic() > until):
+        if p.wait_for_port and self._is_missing():
+            log.warning("%s is not there: waiting up to %g s for it", p.serial_port, p.wait_for_port)
+            self._tell(diagnostics.WARN, f"waiting for {p.serial_port}")
+            self._pause(p.wait_for_port)
+
+    def _is_missing(self) -> bool:
+        return self._params.channel_type == "serial" and not Path(self._params.serial_port).exists()
+
+    def _pause(self, seconds: float) -> None:
+        """Wait; no longer than until a serial device that is missing has come."""
+        was_missing, until = self._is_missing(), time.monotonic() + seconds
+        while not rospy.is_shutdown() and time.monotonic() < until and self._is_missing() == was_missing:
             self._wait(_IDLE)
 
     def _open(self) -> tuple[Lidar, DeviceInfo]:
