@@ -101,7 +101,7 @@ class Threshold:
         0.0,
         lo=0.0,
         hi=1.0,
-        doc="minimum objectness, and minimum probability of a class; 0: what auto takes says it, otherwise 0.3",
+        doc="minimum objectness, and minimum probability of a class; 0: auto takes the network's own, else 0.3",
     )
 
 
