@@ -199,7 +199,6 @@ COLUMNS = (
     "all persons",
     "false",
     "clear, visible",
-    "clear, any person",
 )
 COLUMNS += ("clear, any person", "unverified", "empty unverified", "pictures", "looks")
 HEAD = f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}"

@@ -12,6 +12,8 @@ from belief_pictures import calibration
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rosbot_patrol.detection.choice import REAL_CAMERAS
+from rosbot_patrol.detection.ssd.model_file import GRAPH_SHA256
 from rosbot_patrol.errors import DetectorError
 from rosbot_patrol.patrol.belief.calibration import (
     CAUTIOUS,
@@ -80,6 +82,13 @@ def test_a_network_is_found_by_its_sum_or_by_name(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     assert find_calibration([gone, tmp_path], "another name", "sum").network == "test"
     assert find_calibration([tmp_path], "test").sha256 == "sum"
+
+
+def test_both_networks_for_a_real_camera_have_one() -> None:
+    shipped = [Path(__file__).parents[4] / "config" / "calibrations"]
+    for name in REAL_CAMERAS:
+        assert find_calibration(shipped, name).network == name
+    assert find_calibration(shipped, "ssdlite", GRAPH_SHA256).network == "ssdlite"
 
 
 def test_a_network_without_one_is_told_in_a_sentence(tmp_path: Path) -> None:
