@@ -142,7 +142,9 @@ class RplidarNode:
     def _pause(self, seconds: float) -> None:
         """Wait; no longer than until a serial device that is missing has come."""
         was_missing, until = self._is_missing(), time.monotonic() + seconds
-        while not rospy.is_shutdown() and time.monotonic() < until and self._is_missing() == was_missing:
+        while not rospy.is_shutdown() and time.monotonic() < until:
+            if was_missing and not self._is_missing():
+                return
             self._wait(_IDLE)
 
     def _open(self) -> tuple[Lidar, DeviceInfo]:
