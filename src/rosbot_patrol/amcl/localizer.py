@@ -193,11 +193,14 @@ class Localizer:
         if reading is Reading.RESTART:
             self._restart(odom_from_base)
         self._track.follow(scan.stamp, odom_from_base)
+        is_due = self._is_due(scan.frame_id, odom_from_base)
+        is_watched = not 0.0 <= scan.stamp - self._watched < WATCH_S
+        if not (is_due or is_watched or self._seeker):
+            return Outcome()
         beams = pick_beams(scan, base_from_laser, self._params)
-        outcome = Outcome()
-        if self._is_due(scan.frame_id, odom_from_base):
-            outcome = self._update(known, beams, odom_from_base)
-        self._watch(known, beams, scan.stamp, odom_from_base)
+        outcome = self._update(known, beams, odom_from_base) if is_due else Outcome()
+        if is_watched:
+            self._watch(known, beams, scan.stamp, odom_from_base)
         return self._search(known, beams, odom_from_base) or outcome
 
     def _is_due(self, frame: str, odometry: Pose2D) -> bool:
@@ -271,7 +274,7 @@ class Localizer:
 
     def _watch(self, known: KnownMap, beams: Beams, stamp: float, odometry: Pose2D) -> None:
         """Compare the estimate with the scan."""
-        if self.map_from_odom is None or self.estimate is None or 0.0 <= stamp - self._watched < WATCH_S:
+        if self.map_from_odom is None or self.estimate is None:
             return
         self._watched = stamp
         pose = compose(self.map_from_odom, odometry)

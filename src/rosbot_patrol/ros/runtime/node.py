@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import rospy
 from rospy.core import is_shutdown_requested
+from rospy.rostime import is_wallclock
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError, PatrolError, StateError
@@ -189,17 +190,26 @@ def _end_with_worker(args: threading.ExceptHookArgs) -> None:
     threading.__excepthook__(args)
 
 
+_LONGEST_S = 0.1  # sleep of a loop [s of the wall]
+_SHORTEST_S = 0.001  # the same while simulated time is awaited
+_PACE_S = 0.2  # over which the pace of simulated time is taken [s of the wall]
+
+
 class Loop(Worker):
     """Call `step(now)` at a rate of ROS time on its own thread; it does not hang if simulated time stops.
 
-    After a step that takes too long the next follows at once; missed steps are not repeated.
+    After a step that takes too long the next follows at once; missed steps are not repeated. On the wall's time it
+    sleeps until the next step. Simulated time comes in ticks and at a pace of its own: there each sleep is half of what
+    is left at the pace so far, as waking at each tick would cost more than most steps.
     """
 
     def __init__(self, rate: float, step: Callable[[float], None], *, name: str = "loop") -> None:
         super().__init__(name=name)
         self._period = 1.0 / rate
         self._step = step
-        self._hurried = False
+        self._wake = threading.Event()
+        self._pace = 1.0  # seconds of ROS time in one of the wall
+        self._paced = time.monotonic(), 0.0  # wall and ROS time from which on it is taken
 
     def set_rate(self, rate: float) -> None:
         """Change the rate from the next step on."""
@@ -207,7 +217,7 @@ class Loop(Worker):
 
     def hurry(self) -> None:
         """Request an extra step at once; callable from any thread."""
-        self._hurried = True
+        self._wake.set()
 
     def run(self) -> None:
         """Run until shutdown."""
@@ -218,12 +228,21 @@ class Loop(Worker):
                 due = current
             if current >= due:
                 due = max(due + self._period, current)
-            elif not self._hurried:
-                self._wait(due - current)
+            elif not self._wake.is_set():
+                self._wait(current, due)
                 continue
-            self._hurried = False
+            self._wake.clear()
             self._step(current)
 
-    def _wait(self, seconds: float) -> None:
-        # Simulated time may run faster or slower than the wall: check often, never block for long.
-        time.sleep(min(max(seconds / 3.0, 0.001), 0.01))
+    def _wait(self, current: float, due: float) -> None:
+        seconds = due - current
+        if not is_wallclock():
+            seconds = max(0.5 * seconds / self._measured_pace(current), _SHORTEST_S)
+        self._wake.wait(min(seconds, _LONGEST_S))
+
+    def _measured_pace(self, current: float) -> float:
+        wall, (since, before) = time.monotonic(), self._paced
+        if wall - since >= _PACE_S:
+            self._pace = max((current - before) / (wall - since), 1.0)
+            self._paced = wall, current
+        return self._pace

@@ -77,7 +77,7 @@ class Transforms:
 
     def _find(self, target: str, source: str, when: rospy.Time) -> tuple[Transform, float]:
         try:
-            found = self.buffer.lookup_transform(target.lstrip("/"), source.lstrip("/"), when)
+            found = self.buffer.lookup_transform_core(target.lstrip("/"), source.lstrip("/"), when)
         except tf2_ros.TransformException as err:
             raise TransformError(target, source, str(err)) from err
         t, q = found.transform.translation, found.transform.rotation
