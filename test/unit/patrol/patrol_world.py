@@ -33,7 +33,7 @@ class World:
         self.triggers, self.requests = [], []
         self.guarded, self.stop, self.battery, self.wall = Guarded(), "", None, 1.7e9
         self.all = []
-        self.goals, self.reports, self.notices, self.ended, self.speeds = [], [], [], [], []
+        self.goals, self.reports, self.notices, self.ended, self.speeds, self.words = [], [], [], [], [], []
         self.cancels = 0
         for key, value in given.items():
             setattr(self, key, value)
@@ -85,6 +85,7 @@ class World:
         self.reports += [out.report] if out.report else []
         self.notices += out.alarms
         self.ended += out.ended
+        self.words += out.words
 
     def _glide(self):
         target = self.goals[-1].pose.x

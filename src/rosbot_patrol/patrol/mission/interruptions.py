@@ -183,8 +183,6 @@ def leave_out_off_the_map(run: MissionRun, inputs: Inputs, out: Commands) -> Non
     if not problem:
         return
     run.decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at: {problem}")
-    if mission.origin is Origin.TRIGGER:
-        text = f"motion in {mission.room.title}, which cannot be looked at: {problem}"
-        out.words += (OwnerMessage(kind=f"room {mission.room.id}", text=text),)
+    run.tell_of_call(f"which cannot be looked at: {problem}", out)
     out.cancel = True
     run.turn_home(out)

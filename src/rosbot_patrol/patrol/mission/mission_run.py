@@ -23,9 +23,10 @@ from rosbot_patrol.patrol.mission.phases import (
 )
 from rosbot_patrol.patrol.mission.views import Viewpoints, Views
 from rosbot_patrol.patrol.records.activity import Activity, Place
-from rosbot_patrol.patrol.records.commands import Commands, IntruderAlarm
+from rosbot_patrol.patrol.records.commands import Commands, IntruderAlarm, OwnerMessage
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
+from rosbot_patrol.patrol.records.request import Origin
 from rosbot_patrol.patrol.story import status_text
 from rosbot_patrol.patrol.story.status_text import StatusReports
 
@@ -126,6 +127,13 @@ class MissionRun:
         mission.sightings = max(mission.sightings, 1)
         log.warning("%s", reason)
 
+    def tell_of_call(self, problem: str, out: Commands) -> None:
+        """Tell the owner of a motion sensor's call to which the robot could not see; `problem` ends the sentence."""
+        mission = self.mission
+        if mission.origin is Origin.TRIGGER:
+            text = f"motion in {mission.room.title}, {problem}"
+            out.words += (OwnerMessage(kind=f"room {mission.room.id}", text=text),)
+
     def return_home(self) -> None:
         """Go over to the way home."""
         self._enter(Phase.RETURNING, None)
@@ -166,8 +174,10 @@ class MissionRun:
                 out.changed = True
                 self._enter(Phase.LOOKING, inputs.pose)
                 self._say(out, Phase.LOOKING, f"arrived in {self.mission.room.title}")
-            case Ruling(verdict, reason):
+            case Ruling(verdict, reason, fault):
                 self.decide(verdict, reason)
+                if fault and self.mission.verdict is not Verdict.CONFIRMED:
+                    self.tell_of_call(f"which could not be looked at to the end: {fault}", out)
                 self.turn_home(out)
             case Place():
                 return step.outcome

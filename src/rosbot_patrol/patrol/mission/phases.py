@@ -25,10 +25,16 @@ class Arrived:
 
 @dataclass(frozen=True)
 class Ruling:
-    """The verdict that a phase comes to, with its sentence."""
+    """The verdict that a phase comes to.
+
+    Attributes:
+        verdict, reason: with its sentence.
+        fault: of the robot (its camera shows nothing, no navigation), which kept it from looking, "" if none did.
+    """
 
     verdict: Verdict
     reason: str
+    fault: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +97,8 @@ class DrivingTo:
             return PhaseStep(status=Phase.STARTING, why=why, goal=step.goal, cancel=step.cancel)
         outcome: Arrived | Ruling | None = Arrived() if step.reached else None
         if step.problem:
-            outcome = Ruling(Verdict.UNREACHABLE, f"{title} cannot be reached: {step.problem}")
+            reason, fault = f"{title} cannot be reached: {step.problem}", step.problem if step.is_down else ""
+            outcome = Ruling(Verdict.UNREACHABLE, reason, fault)
         why = f"driving to {title}{'' if self._trip.is_at_first else ', to another viewpoint in it'}"
         return PhaseStep(status=self.phase, why=why, goal=step.goal, cancel=step.cancel, outcome=outcome)
 
@@ -140,14 +147,15 @@ class LookingAround:
             outcome=self._ruling(step.problem) if step.done else None,
         )
 
-    def _ruling(self, problem: str) -> Ruling:
-        problem = problem or self._views.blind()
+    def _ruling(self, fault: str) -> Ruling:
+        problem = fault or self._views.blind()
         if not problem:
             clear = status_text.clear(self._mission, self._look.turned_deg, self._decision.belief.vetoes)
             return Ruling(Verdict.CLEAR, clear)
         moved = self._views.moved()
         also = f"; {moved}" if moved else ""
-        return Ruling(Verdict.UNVERIFIED, f"{self._mission.room.title} could not be verified: {problem}{also}")
+        reason = f"{self._mission.room.title} could not be verified: {problem}{also}"
+        return Ruling(Verdict.UNVERIFIED, reason, fault)
 
     def pause(self) -> bool:
         """Interrupt the drive to a further viewpoint, if there is one."""

@@ -163,14 +163,14 @@ class Look:
             self._problem = self._blind(now, inputs)
 
     def _blind(self, now: float, inputs: Inputs) -> str:
-        silent = _silent(now, inputs.detector_at, self.params.detector_timeout)
-        if silent:
-            return f"the detector {silent}"
         timeout = self.params.camera_timeout
         if self._needs_camera and inputs.camera_at == -math.inf:
             return "the camera has not shown anything"
         if self._needs_camera and now - inputs.camera_at > timeout:
             return f"the camera has shown nothing for more than {timeout:g} s"
+        silent = _silent(now, inputs.detector_at, self.params.detector_timeout)  # without pictures it is silent, too
+        if silent:
+            return f"the detector {silent}"
         same = max(inputs.camera_changed_at, self._turning_since)
         if self._needs_camera and now - same > timeout:
             return f"the camera showed the same picture for more than {timeout:g} s of turning"

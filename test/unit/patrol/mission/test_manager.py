@@ -150,6 +150,10 @@ def test_blind_is_unverified_never_clear(dead, word):
     assert world.ended[0].verdict.value == "unverified"
     assert word in world.ended[0].reason
     assert world.notices == []
+    (told,) = world.words
+    assert told.kind == "room 1"
+    assert told.text.startswith("motion in room 1 (name1), which could not be looked at to the end: the ")
+    assert word in told.text
 
 
 def test_a_detector_that_dies_for_a_part_of_the_turn_is_unverified():
@@ -218,6 +222,8 @@ def test_a_move_base_that_stays_down_is_bounded_and_said():
     world.run(lambda w: w.ended, limit=200)
     assert world.ended[0].verdict.value == "unreachable"
     assert "did not answer for 60 s" in world.ended[0].reason
+    assert "motion in" in world.words[0].text
+    assert "did not answer for 60 s" in world.words[0].text
     assert "not at home" in world.reports[-1].why
 
 

@@ -55,10 +55,9 @@ def test_a_correction_that_fails_takes_nothing_from_the_turn():
 def test_the_wait_for_the_eyes_is_bounded():
     look = Look(LookParams(detector_wait=5.0), SpinParams())
     assert look.step(0.0, Inputs(yaw=0.0), candidate=False).speed == 0.0
-    assert (
-        "waiting before the turn: the detector has not been heard"
-        in look.step(4.9, Inputs(yaw=0.0), candidate=False).why
-    )
+    assert "before the turn: the camera has not" in look.step(2.0, Inputs(yaw=0.0), candidate=False).why
+    seeing = Inputs(yaw=0.0, camera_at=4.9)
+    assert "before the turn: the detector has not been heard" in look.step(4.9, seeing, candidate=False).why
     assert look.step(5.1, Inputs(yaw=0.0), candidate=False).speed > 0.0
 
 
