@@ -19,7 +19,7 @@ from rospy.rostime import is_wallclock
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError, PatrolError, StateError
 from rosbot_patrol.files import read_json
-from rosbot_patrol.ros.runtime import greeting, logs, single_links
+from rosbot_patrol.ros.runtime import connections, greeting, logs
 from rosbot_patrol.ros.runtime.by_hand import require_master
 from rosbot_patrol.ros.runtime.process import Priority, follow_restart, give_back_memory, take
 
@@ -60,7 +60,7 @@ def run_node(
     refused = take(priority)  # before any thread starts: threads inherit it
     gives_back = give_back_memory()
     greeting.install()
-    single_links.install()
+    connections.install()
     rospy.init_node(name, **init_options)
     logs.install()
     if refused:

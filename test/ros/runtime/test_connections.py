@@ -10,7 +10,7 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 
 from rospy.impl.masterslave import ROSHandler
 
-from rosbot_patrol.ros.runtime import single_links
+from rosbot_patrol.ros.runtime import connections
 
 
 class Links:
@@ -36,9 +36,9 @@ class Links:
 @pytest.fixture
 def links(monkeypatch):
     found = Links()
-    monkeypatch.setattr(single_links, "_connect", found.connect)
+    monkeypatch.setattr(connections, "_connect", found.connect)
     monkeypatch.setattr(ROSHandler, "_connect_topic", ROSHandler._connect_topic)
-    single_links.install()
+    connections.install()
     return found
 
 
@@ -68,10 +68,10 @@ def test_a_publisher_that_cannot_be_asked_leaves_no_lock(links, monkeypatch):
     def fail(*_):
         raise OSError("refused")
 
-    monkeypatch.setattr(single_links, "_connect", fail)
+    monkeypatch.setattr(connections, "_connect", fail)
     with pytest.raises(OSError, match="refused"):
         ROSHandler._connect_topic(None, "/tf", "http://a:1/")
-    monkeypatch.setattr(single_links, "_connect", links.connect)
+    monkeypatch.setattr(connections, "_connect", links.connect)
     connect_all(("/tf", "http://a:1/"))
     assert links.made == [("/tf", "http://a:1/")]
 
