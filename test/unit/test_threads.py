@@ -11,6 +11,7 @@ ROS = Path(__file__).parents[2] / "src" / "rosbot_patrol" / "ros"
 PLAIN = {
     "runtime/node.py": "ends the node on a signal",
     "runtime/greeting.py": "one a link; ends with it",
+    "runtime/connections.py": "one a subscriber; what fails there is raised where the node publishes next",
     "runtime/by_hand.py": "asks the master before a tool is a node",
     "campaign/mail_sink.py": "a server of the standard library in a program that is no node",
 }
