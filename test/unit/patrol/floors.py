@@ -49,6 +49,15 @@ TWO_ROOMS = (
     "###################",
 )  # 9.5 x 4.5 m, a door of 1 m in the middle at y 1.5 to 2.5
 
+DESK = (
+    "############",
+    "#....    ..#",
+    "#....####..#",
+    "#..........#",
+    "#..........#",
+    "############",
+)  # 6 x 3 m, unmapped behind a desk from x 2.5 to 4.5, y 2.0 to 2.5
+
 
 _SIGHTS: OrderedDict[tuple[int, float, float, float], tuple[Floor, Sight]] = OrderedDict()
 

@@ -1,7 +1,8 @@
 """Floor of a map on a grid coarse enough for plain numpy, with the clearance to obstacles.
 
 The patrol uses it to decide where a person could be, where the robot can stand and how far one can see. Unknown cells
-of the map are no floor: the inside of a cupboard, or space beyond a window.
+of the map are no floor: the inside of a cupboard, or space beyond a window. But where floor runs into them without an
+obstacle between, as behind a desk that the mapping drove past, somebody may stand there.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ EDGE = 0.1  # of a cell of the floor [m]
 CLEARANCE_MOST = 1.0  # clearances are exact up to here [m]
 _SKIPPED = 0.2  # skipped start of a line of sight: the robot itself stands there [m]
 _MARGIN = 0.3  # around the known part of the map [m]
+_BODY = 0.2  # radius of a person [m]
+_DEPTH = 1.5  # of unmapped floor beyond the mapped [m]
+_UNMAPPED = 0.01  # clearance of it: it belongs to a room, and nobody drives there [m]
 
 
 @dataclass(frozen=True)
@@ -33,13 +37,15 @@ class Floor:
 
     Attributes:
         info: place and size of the grid, in the map's frame.
-        free: floor, shape (height, width).
+        free: floor, mapped or not, shape (height, width).
         clearance: distance of a floor cell from obstacles and unknown cells [m], at most CLEARANCE_MOST; 0 elsewhere.
+        unmapped: cells of `free` that are unknown on the map, and that mapped floor runs into.
     """
 
     info: GridInfo
     free: Mask
     clearance: Array
+    unmapped: Mask
 
     @property
     def cell_area(self) -> float:
@@ -47,9 +53,9 @@ class Floor:
         return self.info.resolution**2
 
     def is_free(self, x: float, y: float) -> bool:
-        """Whether a point lies on the floor."""
+        """Whether a point lies on mapped floor."""
         ix, iy = self.info.cell_of(x, y)
-        return self.info.contains_cell(ix, iy) and bool(self.free[iy, ix])
+        return self.info.contains_cell(ix, iy) and bool(self.free[iy, ix] and not self.unmapped[iy, ix])
 
     def nearest(self, mask: Mask, x: float, y: float, within: float = math.inf) -> tuple[int, int] | None:
         """(ix, iy) of the mask's cell nearest to a point, None if there is none within a distance [m]."""
@@ -95,7 +101,7 @@ class Floor:
         return float(xs[k]), float(ys[k])
 
     def are_free(self, xs: Array, ys: Array) -> Mask:
-        """Whether points lie on the floor."""
+        """Whether points lie on the floor, mapped or not."""
         i = self.info
         ix = ((xs - i.origin_x) * (1.0 / i.resolution)).astype(
             np.int32
@@ -134,27 +140,44 @@ def floor_of(grid: Grid, *, free_below: int = 25, zones: Sequence[Zone] = ()) ->
     if not is_floor.any():
         raise MapError("the map", "shows no free cell, so that nobody can say what of a room was seen")
     fold = max(1, round(EDGE / grid.info.resolution))
-    info, fine = _cropped(grid.info, is_floor, fold)
+    info, fine, unknown = _cropped(grid.info, is_floor, grid.cells < 0, fold)
     fine_info = replace(info, resolution=grid.info.resolution, width=fine.shape[1], height=fine.shape[0])
     open_to_robot = fine & ~zones_mask(zones, fine_info) if zones else fine
     clearance = _clearance(open_to_robot, CLEARANCE_MOST / grid.info.resolution) * grid.info.resolution
     blocks = (info.height, fold, info.width, fold)
     free = fine.reshape(blocks).mean(axis=(1, 3)) >= 0.5
     coarse = clearance.reshape(blocks).max(axis=(1, 3))
-    return Floor(info, free, np.where(free, coarse, 0.0))
+    pockets = _pockets(fine, unknown, grid.info.resolution).reshape(blocks).mean(axis=(1, 3)) >= 0.5
+    unmapped = pockets & ~free
+    return Floor(info, free | unmapped, np.where(free, coarse, np.where(unmapped, _UNMAPPED, 0.0)), unmapped)
 
 
-def _cropped(info: GridInfo, is_floor: Mask, fold: int) -> tuple[GridInfo, Mask]:
-    """Coarse grid around the floor, and the fine cells under it."""
+def _pockets(floor: Mask, unknown: Mask, resolution: float) -> Mask:
+    """Unknown cells that a person gets to from mapped floor without passing an obstacle, _DEPTH deep at most."""
+    body, steps = max(round(_BODY / resolution), 1), round(_DEPTH / resolution)
+    rows, columns = np.nonzero(floor)
+    inside = np.zeros(floor.shape, bool)  # between the outermost floor of the house, not beyond its walls
+    inside[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1] = True
+    room_for_body = ~grown(~(floor | (unknown & inside)), body)
+    reached = ~grown(~floor, body)
+    for _ in range(steps):
+        reached = grown(reached, 1) & room_for_body
+    pockets: Mask = grown(reached, body) & unknown & inside
+    return pockets
+
+
+def _cropped(info: GridInfo, is_floor: Mask, is_unknown: Mask, fold: int) -> tuple[GridInfo, Mask, Mask]:
+    """Coarse grid around the floor, and the fine cells under it: which are floor, and which are unknown."""
     margin = math.ceil(_MARGIN / info.resolution)
     rows, columns = np.flatnonzero(is_floor.any(axis=1)), np.flatnonzero(is_floor.any(axis=0))
     y0, x0 = int(rows[0]) - margin, int(columns[0]) - margin
     height = math.ceil((int(rows[-1]) + 1 + margin - y0) / fold)
     width = math.ceil((int(columns[-1]) + 1 + margin - x0) / fold)
-    fine = np.zeros((height * fold, width * fold), bool)
+    fine, unknown = np.zeros((2, height * fold, width * fold), bool)
     into_y, into_x = max(-y0, 0), max(-x0, 0)
-    part = is_floor[max(y0, 0) : y0 + height * fold, max(x0, 0) : x0 + width * fold]
-    fine[into_y : into_y + part.shape[0], into_x : into_x + part.shape[1]] = part
+    for whole, cells in ((is_floor, fine), (is_unknown, unknown)):
+        part = whole[max(y0, 0) : y0 + height * fold, max(x0, 0) : x0 + width * fold]
+        cells[into_y : into_y + part.shape[0], into_x : into_x + part.shape[1]] = part
     coarse = GridInfo(
         resolution=info.resolution * fold,
         width=width,
@@ -162,7 +185,7 @@ def _cropped(info: GridInfo, is_floor: Mask, fold: int) -> tuple[GridInfo, Mask]
         origin_x=info.origin_x + x0 * info.resolution,
         origin_y=info.origin_y + y0 * info.resolution,
     )
-    return coarse, fine
+    return coarse, fine, unknown
 
 
 def _clearance(free: Mask, most: float) -> Array:

@@ -64,12 +64,10 @@ def part_rooms(floor: Floor, rooms: Rooms) -> RoomRegions:
     levels = np.ceil(floor.clearance / _LEVEL - 1e-9).astype(int)
     seeds, lost = [], []
     for room in rooms:
-        xs, ys = np.array([room.pose.x]), np.array([room.pose.y])
-        if not floor.are_free(xs, ys)[0]:
+        if not floor.is_free(room.pose.x, room.pose.y):
             lost.append(room.id)
             continue
-        ix, iy, _ = floor.indices(xs, ys)
-        cell = int(ix[0]), int(iy[0])
+        cell = floor.info.cell_of(room.pose.x, room.pose.y)
         seeds += [(room.id, ix, iy) for ix, iy in _climb(levels, *cell) if labels[iy, ix] == NOBODYS]
         labels[cell[1], cell[0]] = room.id
     _flood(levels, labels, seeds)

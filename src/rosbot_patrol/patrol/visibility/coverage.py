@@ -72,13 +72,17 @@ class Sight:
 
     def reaches(self, bearings: Array, distances: Array) -> Mask:
         """Which places, by bearing in map and distance, have a free line to them; False where no beam looks there."""
+        found: Mask = distances <= self.towards(bearings)
+        return found
+
+    def towards(self, bearings: Array) -> Array:
+        """Free way at bearings in map [m], -inf where no beam looks there."""
         turn = (bearings - self.first) * math.copysign(1.0, self.step) % math.tau
         beams = np.rint(turn / abs(self.step)).astype(np.int64)
         whole = round(math.tau / abs(self.step))
         beams = np.where(beams >= whole, beams - whole, beams)
         known = beams < len(self.lengths)
-        found: Mask = known & (distances <= self.lengths[np.where(known, beams, 0)])
-        return found
+        return np.where(known, self.lengths[np.where(known, beams, 0)], -math.inf)
 
 
 def sight_on_map(floor: Floor, x: float, y: float, reach: float) -> Sight:
@@ -135,6 +139,7 @@ class Coverage:
         self._seen_at = np.full(len(self._x), -math.inf)
         self._left = np.arange(len(self._x))
         self._gone = np.zeros(len(self._x), bool)
+        self._unmapped = floor.unmapped[self._iy, self._ix]
         self._whole = len(self._x)
 
     @property
@@ -165,11 +170,24 @@ class Coverage:
         shows = (away <= p.view_range) & (aside <= eye.width / 2.0 - p.view_edge)
         near = left[shows]
         dx, dy = self._x[near] - sight.x, self._y[near] - sight.y
-        shows[shows] = sight.reaches(np.arctan2(dy, dx), np.hypot(dx, dy) - p.view_slack)
+        bearings, free = np.arctan2(dy, dx), np.hypot(dx, dy) - p.view_slack
+        reached = sight.reaches(bearings, free)
+        self._strike_out(near[~reached], bearings[~reached], sight)
+        shows[shows] = reached
         shown = left[shows | (away < p.view_near)]
         self._seen[shown] += 1
         self._seen_at[shown] = at
         self._left = left[self._seen[left] < p.seen_in]
+
+    def _strike_out(self, hidden: NDArray[np.int64], bearings: Array, sight: Sight) -> None:
+        """Leave out unmapped floor before which a wall shows that is not on the map either."""
+        unmapped = self._unmapped[hidden]
+        cells, bearings = hidden[unmapped], bearings[unmapped]
+        ways = sight.towards(bearings)
+        seen = np.isfinite(ways)
+        cells, bearings, ways = cells[seen], bearings[seen], ways[seen]
+        ix, iy, inside = self.floor.indices(sight.x + ways * np.cos(bearings), sight.y + ways * np.sin(bearings))
+        self._gone[cells[inside & self.floor.unmapped[iy, ix]]] = True
 
     def forget(self, before: float) -> None:
         """What was seen before a time [s] is yet to be seen."""

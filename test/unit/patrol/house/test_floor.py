@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from floors import TWO_ROOMS, drawn_floor, drawn_map
+from floors import DESK, TWO_ROOMS, drawn_floor, drawn_map
 
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
@@ -84,3 +84,35 @@ def test_zones_are_floor_where_the_robot_does_not_go() -> None:
     assert clearance(1.5, 1.5) == 0.0
     assert clearance(2.35, 1.5) == pytest.approx(0.35, abs=0.1)
     assert clearance(6.0, 3.0) > 0.9
+
+
+def test_unknown_cells_that_floor_runs_into_are_unmapped_floor() -> None:
+    floor = drawn_floor(*DESK)
+    assert floor.unmapped.sum() * floor.cell_area == pytest.approx(1.0, abs=0.05)
+    ys, xs = np.nonzero(floor.unmapped)
+    assert 2.5 <= xs.min() * 0.1 + floor.info.origin_x <= 2.6
+    assert 1.95 <= ys.min() * 0.1 + floor.info.origin_y <= 2.05
+    assert floor.are_free(np.array([3.0]), np.array([2.25])).all()
+    assert not floor.is_free(3.0, 2.25)  # no place for a room's point
+    assert floor.clearance[floor.unmapped].max() < 0.05  # and none to drive to
+
+
+CLOSED = {
+    "a cupboard": ("########", "#..##..#", "#..# #.#", "#..##..#", "########"),
+    "outside of a house without walls": ("....", "....", "...."),
+}
+
+
+@pytest.mark.parametrize("what", CLOSED)
+def test_unknown_cells_that_nobody_gets_to_are_no_floor(what: str) -> None:
+    assert not drawn_floor(*CLOSED[what]).unmapped.any()
+
+
+def test_unmapped_floor_is_as_deep_as_somebody_hides() -> None:
+    deep = drawn_floor("#" * 22, "#...." + " " * 16 + "#", "#" * 22)
+    assert not deep.unmapped.any()  # the house ends where the mapped floor does
+    deep = drawn_floor("#" * 22, "#...." + " " * 13 + "...#", "#" * 22)
+    xs = np.nonzero(deep.unmapped)[1] * 0.1 + deep.info.origin_x
+    assert ((xs < 4.3) | (xs > 7.2)).all()
+    assert xs.min() < 2.7
+    assert xs.max() > 8.7

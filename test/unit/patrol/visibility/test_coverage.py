@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from floors import TWO_ROOMS, drawn_floor, points
+from floors import DESK, TWO_ROOMS, drawn_floor, points
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.floor import Floor
@@ -160,3 +160,25 @@ def test_nothing_is_seen_of_a_room_without_floor() -> None:
     coverage = Coverage(empty, np.zeros(empty.info.shape, bool))
     coverage.look(Eye(pose=Pose2D(1.0, 1.0, 0.0), width=WIDTH), sight_on_map(empty, 1.0, 1.0, 8.0))
     assert coverage.share == 0.0
+
+
+def test_what_the_mapping_drive_passed_by_is_yet_to_be_seen() -> None:
+    floor = drawn_floor(*DESK)
+    room = part_rooms(floor, points((3.0, 1.0))).mask(0)
+    coverage = Coverage(floor, room, ONCE)
+    turn_at(coverage, 3.0, 1.0, sight_on_map(floor, 3.0, 1.0, 8.0))
+    assert (coverage.unseen() & floor.unmapped).sum() > 0.9 * floor.unmapped.sum()
+    turn_at(coverage, 1.0, 2.25, sight_on_map(floor, 1.0, 2.25, 8.0))
+    assert not (coverage.unseen() & floor.unmapped).any()
+
+
+def test_unmapped_floor_ends_at_what_the_lidar_shows_there() -> None:
+    floor = drawn_floor(*DESK)
+    coverage = Coverage(floor, part_rooms(floor, points((3.0, 1.0))).mask(0), ONCE)
+    wall = 2.0  # a cupboard stands behind the desk, 3.0 m along
+    by_map = sight_on_map(floor, 1.0, 2.25, 8.0)
+    scan = a_scan(np.minimum(np.roll(by_map.lengths, len(by_map.lengths) // 2), wall))
+    turn_at(coverage, 1.0, 2.25, sight_of_scan(scan, Pose2D(1.0, 2.25, 0.0), floor, 8.0))
+    left = coverage.unseen() & floor.unmapped
+    assert left.sum() < 0.05 * floor.unmapped.sum()
+    assert coverage.unseen().any()  # the floor beyond is mapped, and yet to be seen
