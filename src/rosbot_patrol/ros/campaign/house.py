@@ -7,6 +7,8 @@ one master.
 from __future__ import annotations
 
 import contextlib
+import itertools
+import math
 import os
 import signal
 import subprocess
@@ -99,7 +101,8 @@ class Mission:
     """Observations of one mission, from ground truth.
 
     Attributes:
-        turned: the look-around at the room's point, before any further viewpoint [rad].
+        look: begin and end of the look-around at the room's point, before any further viewpoint [s].
+        headings: true heading of the robot by time [s, rad].
     """
 
     room: int
@@ -107,7 +110,8 @@ class Mission:
     verdict: str = ""
     why: list[str] = field(default_factory=list)
     arrival: Pose2D | None = None
-    turned: float = 0.0
+    look: tuple[float, float] = (math.inf, math.inf)
+    headings: list[tuple[float, float]] = field(default_factory=list)
     end: Pose2D | None = None
     alerts: list[Alert] = field(default_factory=list)
     contacts: list[tuple[str, str]] = field(default_factory=list)
@@ -115,11 +119,25 @@ class Mission:
     wall_seconds: float = 0.0
 
     @property
-    def is_at_point(self) -> bool:
-        """Whether it looks around at the room's point; further viewpoints, with turns there, may follow."""
-        if not self.states or self.states[-1] != PatrolState.LOOKING:
-            return False
-        return not any("further viewpoint" in why for why in self.why)
+    def turned(self) -> float:
+        """Angle of the look-around at the room's point, by the stamps of states and headings [rad]."""
+        begin, end = self.look
+        headings = [yaw for stamp, yaw in self.headings if begin <= stamp <= end]
+        return sum(wrap_angle(after - before) for before, after in itertools.pairwise(headings))
+
+    def note_state(self, state: PatrolState) -> None:
+        """Record a state of the patrol."""
+        stamp = state.header.stamp.to_sec()
+        is_at_point = state.state == PatrolState.LOOKING and "further viewpoint" not in state.why
+        begin, end = self.look
+        if math.isinf(begin) and is_at_point:
+            self.look = (stamp, math.inf)
+        elif math.isfinite(begin) and math.isinf(end) and not is_at_point:
+            self.look = (begin, stamp)
+        self.states.append(state.state)
+        self.why.append(state.why)
+        if state.state == PatrolState.IDLE:
+            self.verdict = state.last_verdict
 
 
 class House:
@@ -346,10 +364,7 @@ class House:
                 mission.arrival = self.pose
             if not mission.states and state.state == PatrolState.IDLE:
                 return  # still the rest before the mission
-            mission.states.append(state.state)
-            mission.why.append(state.why)
-            if state.state == PatrolState.IDLE:
-                mission.verdict = state.last_verdict
+            mission.note_state(state)
 
     def _on_alert(self, alert: Alert) -> None:
         if alert.kind == Alert.VERDICT:
@@ -360,12 +375,11 @@ class House:
                 self._mission.alerts.append(alert)
 
     def _on_truth(self, odometry: Odometry) -> None:
-        pose = pose2d_from_pose(odometry.pose.pose)
+        pose, stamp = pose2d_from_pose(odometry.pose.pose), odometry.header.stamp.to_sec()
         with self._lock:
-            mission = self._mission
-            if mission is not None and mission.is_at_point and self.pose:
-                mission.turned += wrap_angle(pose.yaw - self.pose.yaw)
-            self.pose, self.pose_stamp = pose, odometry.header.stamp.to_sec()
+            if self._mission is not None:
+                self._mission.headings.append((stamp, pose.yaw))
+            self.pose, self.pose_stamp = pose, stamp
 
     def _on_contacts(self, contacts: Contacts) -> None:
         touched = [(c.kind, c.other) for c in contacts.contacts]
