@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from rosbot_patrol.maps.occupancy import FREE, OCCUPIED, UNKNOWN
 
 Points = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Part = tuple[slice, slice]
 
 
 def convex_hull(points: Points) -> Points:
@@ -156,12 +157,24 @@ def seen_map(passed: Mask, filled: Mask, ix: int, iy: int) -> NDArray[np.int8]:
 def grown(mask: Mask, cells: float) -> Mask:
     """A mask grown by this many cells: every cell within that distance of one of it."""
     out = mask.copy()
+    for to, of in _shifts(mask.shape, cells):
+        out[to] |= mask[of]
+    return out
+
+
+def counted(mask: Mask, cells: float) -> NDArray[np.int32]:
+    """How many cells of a mask lie within a distance in cells, for every cell."""
+    out = np.zeros(mask.shape, np.int32)
+    for to, of in _shifts(mask.shape, cells):
+        out[to] += mask[of]
+    return out
+
+
+def _shifts(shape: tuple[int, ...], cells: float) -> Iterator[tuple[Part, Part]]:
+    """Where each shift of a grid by at most a distance in cells puts it, and which part of it that is."""
     reach = math.ceil(cells)
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
-            if dx * dx + dy * dy > cells * cells:
-                continue
-            to = (slice(max(dy, 0), mask.shape[0] + min(dy, 0)), slice(max(dx, 0), mask.shape[1] + min(dx, 0)))
-            of = (slice(max(-dy, 0), mask.shape[0] + min(-dy, 0)), slice(max(-dx, 0), mask.shape[1] + min(-dx, 0)))
-            out[to] |= mask[of]
-    return out
+            if dx * dx + dy * dy <= cells * cells:
+                to = (slice(max(dy, 0), shape[0] + min(dy, 0)), slice(max(dx, 0), shape[1] + min(dx, 0)))
+                yield to, (slice(max(-dy, 0), shape[0] + min(-dy, 0)), slice(max(-dx, 0), shape[1] + min(-dx, 0)))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.maps.raster import grown
+from rosbot_patrol.maps.raster import counted, grown
 from rosbot_patrol.maps.zones import Zone, zones_mask
 
 Mask = NDArray[np.bool_]
@@ -118,10 +118,12 @@ class Floor:
         hit[iy[inside], ix[inside]] = True
         return grown(hit, math.ceil(radius / self.info.resolution - 0.5))
 
-    def open_to(self, mask: Mask, radius: float) -> Mask:
-        """Part of a mask that discs of a radius [m] fit into, without specks and slits."""
+    def hideouts(self, unseen: Mask, radius: float) -> Mask:
+        """Unseen floor where somebody of a radius [m] could stand of whom less than half was seen."""
         cells = max(round(radius / self.info.resolution), 0)
-        return mask & grown(~grown(~mask, cells), cells)
+        stands = self.free & ~grown(~self.free, cells)
+        hidden = stands & (2 * counted(unseen, cells) > counted(self.free, cells))
+        return unseen & grown(hidden, cells)
 
 
 def floor_of(grid: Grid, *, free_below: int = 25, zones: Sequence[Zone] = ()) -> Floor:

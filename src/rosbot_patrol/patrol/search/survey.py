@@ -123,7 +123,7 @@ class Survey:
     def _hideouts(self, unseen: Mask) -> Mask:
         """Unseen floor that is large enough to hide somebody."""
         radius = self._params.viewpoints.hideout
-        return self._house.floor.open_to(unseen, radius) if radius > 0.0 else np.zeros(unseen.shape, bool)
+        return self._house.floor.hideouts(unseen, radius) if radius > 0.0 else np.zeros(unseen.shape, bool)
 
     def before_walls(self, doubt: Hypothesis) -> tuple[float, float]:
         """The place of a hypothesis, moved before the wall if it was measured beyond one."""

@@ -50,7 +50,7 @@ class ViewpointParams:
         unit="m",
         lo=0.0,
         hi=2.0,
-        doc="radius of unseen floor that could hide a person, searched even at coverage_goal; 0: none",
+        doc="radius of a person; where half of one could hide, it searches even at coverage_goal; 0: nowhere",
     )
     viewpoint_clearance: float = param(
         0.35, unit="m", lo=0.1, doc="minimum distance from a viewpoint to obstacles, so that the robot can turn"

@@ -116,3 +116,16 @@ def test_unmapped_floor_is_as_deep_as_somebody_hides() -> None:
     assert ((xs < 4.3) | (xs > 7.2)).all()
     assert xs.min() < 2.7
     assert xs.max() > 8.7
+
+
+@pytest.mark.parametrize(("width", "hides"), [(0.1, False), (0.2, False), (0.3, True), (0.5, True)])
+def test_somebody_of_whom_less_than_half_was_seen_hides(width: float, hides: bool) -> None:
+    floor = drawn_floor(*[6 * "."] * 6)
+    iy, ix = np.nonzero(floor.free)
+    x, _ = floor.centres(ix, iy)
+    unseen = np.zeros_like(floor.free)
+    by_wall = x < x.min() + width - 0.05
+    unseen[iy[by_wall], ix[by_wall]] = True
+    found = floor.hideouts(unseen, 0.2)
+    assert found.any() == hides
+    assert not (found & ~unseen).any()
