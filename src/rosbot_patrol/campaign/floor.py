@@ -100,6 +100,19 @@ class Floor:
         start, goal = drive[0], drive[-1]
         return bool(flood(way, int(start[0]), int(start[1]))[goal[1], goal[0]])
 
+    def is_barred(self, room: int, points: NDArray[np.float64]) -> bool:
+        """Whether something at points, x, y, shape (N, 2) [m], keeps the robot from a room that it could get to."""
+        drive = self._cells_to(room)
+        if not len(drive):
+            return False
+        mask = np.zeros(self.info.shape, bool)
+        for x, y in points:
+            ix, iy = self.info.cell_of(float(x), float(y))
+            if self.info.contains_cell(ix, iy):
+                mask[iy, ix] = True
+        way = self.drivable & ~grown(mask, ROBOT_RADIUS / CELL)
+        return not bool(flood(way, *map(int, drive[0]))[drive[-1][1], drive[-1][0]])
+
     def share_seen(self, eye: Sequence[float], person: Sequence[float], posture: str = "") -> float:
         """Share of a person's body in the line of sight from the robot's camera at a place, 0 to 1.
 

@@ -19,8 +19,9 @@ import yaml
 
 from rosbot_patrol.campaign.cast import CASTS, Cast, Person, Stage
 from rosbot_patrol.campaign.floor import Floor
+from rosbot_patrol.campaign.houses.doorways import shuts
 from rosbot_patrol.campaign.houses.files import HouseFiles
-from rosbot_patrol.campaign.mishaps import mishap_of
+from rosbot_patrol.campaign.mishaps import STRANDED, mishap_of
 from rosbot_patrol.errors import WorldError
 
 KINDS = ("standing", "walking", "hidden", "late", "standing", "walking", "two", "pets", "poster", "empty")
@@ -31,6 +32,7 @@ INTRUDERS = frozenset({"standing", "walking", "hidden", "late", "two"})
 
 CLEAR, CONFIRMED = "clear", "confirmed"
 TRIGGER_AT = 2.0  # [s] after the first guard
+SHUT = 0.15  # share of the patrols to a room with a door that find it shut
 WITHIN = 600.0  # simulated time limit of a patrol [s]
 PASSES = 8  # passes over all rooms: each draws some places and one posture only
 
@@ -129,7 +131,8 @@ def plan_patrol(
     if is_light_drawn:
         light = str(np.random.default_rng([seed, number, 8]).choice(LIGHTS))
         patrol = replace(patrol, scenario={**patrol.scenario, "light": light})
-    return _broken(patrol, rooms, faults) if faults else patrol
+    patrol = _broken(patrol, rooms, faults) if faults else patrol
+    return patrol if patrol.mishap else _shut_out(patrol, floor)
 
 
 def _cast(floor: Floor, kind: str, rooms: Sequence[int], rng: np.random.Generator) -> tuple[int, Cast] | None:
@@ -155,6 +158,24 @@ def _broken(patrol: Patrol, rooms: Sequence[int], every: int) -> Patrol:
         "expect": expect if mishap.allowed else patrol.scenario["expect"],
     }
     return replace(patrol, scenario=tree, mishap=mishap.text, allowed=mishap.allowed)
+
+
+def _shut_out(patrol: Patrol, floor: Floor) -> Patrol:
+    """A patrol before a shut door, if it has one: now and then, in a house with doors."""
+    if np.random.default_rng([patrol.seed, patrol.number, 9]).random() >= SHUT:
+        return patrol
+    doors = patrol.scenario.get("doors", ())
+    barring = next((door for door in doors if shuts(door, floor, patrol.room)), None)
+    if barring is None:
+        return patrol
+    text = f"the door {barring['name']} is shut"
+    tree = {
+        **patrol.scenario,
+        "title": f"{patrol.title}; {text}",
+        "doors": [{**door, "opening": 0.0} if door is barring else door for door in doors],
+        "expect": {key: value for key, value in patrol.scenario["expect"].items() if key != "verdicts"},
+    }
+    return replace(patrol, scenario=tree, mishap=text, allowed=STRANDED)
 
 
 def _patrol(seed: int, number: int, kind: str, *, files: HouseFiles, floor: Floor, room: int, cast: Cast) -> Patrol:

@@ -17,6 +17,7 @@ from rosbot_patrol.files import read_json, write_atomic, write_json
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.simulation.actors.doors import Door, DoorPlace, plain_door
+from rosbot_patrol.simulation.scenario.furniture import MovedFurniture, move_furniture
 from rosbot_patrol.simulation.scene.scene import Body
 from rosbot_patrol.simulation.sdf.world import World, load_world
 from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
@@ -33,7 +34,7 @@ class HouseFiles:
     """Files of a house: world, map, room points and motion sensors.
 
     Attributes:
-        scenario: further keys of every scenario in it, such as the robot's start or doors.
+        scenario: further keys of every scenario in it, such as the robot's start, doors or moved furniture.
     """
 
     name: str
@@ -88,7 +89,7 @@ def scenario_files(name: str, scenario: Mapping[str, Any], folder: Path, root: P
     if name in HOUSES:
         return house_files(name, root)
     paths = {key: Path(os.path.normpath(folder / scenario[key])) for key in _KEYS.values()}
-    rest = {key: scenario[key] for key in ("robot", "doors") if key in scenario}
+    rest = {key: scenario[key] for key in ("robot", "doors", "furniture") if key in scenario}
     return HouseFiles(name, paths["world"], paths["map"], paths["room_points"], paths["motion_sensors"], rest)
 
 
@@ -98,16 +99,29 @@ def moved_scenario(scenario: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def load_house(files: HouseFiles, read: ReadWorld = load_world) -> House:
-    """Read a house; its doors stand as they do when a patrol begins.
+    """Read a house; its doors and its furniture stand as they do when a patrol begins.
 
     Raises:
         PatrolError: a file of it cannot be used.
     """
     world = read(files.world)
-    leaves = [_leaf(place, 0.0) for place in world.doors]
-    leaves += [_leaf(_door(tree), float(tree.get("opening", 0.0))) for tree in files.scenario.get("doors", ())]
     people = tuple(Person(name=actor.name) for actor in world.actors if actor.model == "person")
-    return House(files, (*world.bodies, *leaves), load_rooms(files.rooms), people)
+    leaves = [_leaf(place, 0.0) for place in world.doors]
+    return House(files, _at_begin((*world.bodies, *leaves), files), load_rooms(files.rooms), people)
+
+
+def changed_house(house: House, files: HouseFiles) -> House:
+    """The house of the same world with other entries of its scenarios: doors that are new, and furniture moved."""
+    return replace(house, files=files, bodies=_at_begin(house.bodies, files))
+
+
+def _at_begin(bodies: tuple[Body, ...], files: HouseFiles) -> tuple[Body, ...]:
+    """Bodies with a scenario's moved furniture and its doors."""
+    moved = [MovedFurniture(**tree) for tree in files.scenario.get("furniture", ())]
+    known = {body.name for body in bodies}
+    doors = [tree for tree in files.scenario.get("doors", ()) if tree["name"] not in known]
+    leaves = [_leaf(_door(tree), float(tree.get("opening", 0.0))) for tree in doors]
+    return (*move_furniture(bodies, moved), *leaves)
 
 
 def _door(tree: Mapping[str, Any]) -> DoorPlace:

@@ -9,17 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rosbot_patrol.campaign.cast import Person
+import numpy as np
+
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.houses.drawn import drawn_house_files
-from rosbot_patrol.campaign.houses.files import HouseFiles, house_files, load_house, read_house_folder
+from rosbot_patrol.campaign.houses.files import House, HouseFiles, house_files, load_house, read_house_folder
 from rosbot_patrol.campaign.houses.strange import check_start, find_start, house_of_world, moved_map
+from rosbot_patrol.campaign.houses.varied import vary
 from rosbot_patrol.campaign.plan import house_of
 from rosbot_patrol.campaign.record import Settings
 from rosbot_patrol.errors import ParamError, WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map, write_map
-from rosbot_patrol.ros.campaign.house import House, HouseError, Master
+from rosbot_patrol.ros.campaign.house import House as LaunchedHouse
+from rosbot_patrol.ros.campaign.house import HouseError, Master
 from rosbot_patrol.ros.campaign.runner import Job, Runner
 from rosbot_patrol.ros.models.packages import read_world
 from rosbot_patrol.simulation.plans.catalogue import load_catalogue
@@ -34,11 +37,10 @@ _KEPT = 4  # floors in memory
 
 @dataclass(frozen=True)
 class Place:
-    """Where a patrol takes place: files, floor, and who lives there."""
+    """Where a patrol takes place: the house and its floor."""
 
-    files: HouseFiles
+    house: House
     floor: Floor
-    people: tuple[Person, ...]
 
 
 class Houses:
@@ -59,16 +61,21 @@ class Houses:
         self._catalogue = load_catalogue(root / "config") if settings.generated else None
 
     def of(self, number: int) -> Place:
-        """The house of a patrol. Raises PatrolError."""
-        name = self._name(number)
+        """The house of a patrol; a strange one with some furniture moved, and doors. Raises PatrolError."""
+        name = self.name_of(number)
         if name not in self._places:
             house = load_house(self._files(name), read_world)
             while len(self._places) >= _KEPT:
                 del self._places[next(iter(self._places))]
-            self._places[name] = Place(house.files, Floor(house.bodies, house.rooms), house.people)
-        return self._places[name]
+            self._places[name] = Place(house, Floor(house.bodies, house.rooms))
+        place = self._places[name]
+        if not self._settings.world:
+            return place
+        rng = np.random.default_rng([self._settings.seed, number, 10])
+        return Place(*vary(place.house, place.floor, rng))
 
-    def _name(self, number: int) -> str:
+    def name_of(self, number: int) -> str:
+        """Name of a patrol's house."""
         settings = self._settings
         if settings.generated:
             return f"drawn_{settings.seed * PER_CAMPAIGN + number % settings.generated}"
@@ -152,7 +159,7 @@ def explore(world: Path, folder: Path, start: Pose2D, timeout: float) -> None:
         "explore": "true",
         "save_map": stem,
     }
-    house = House(folder, "rosbot_patrol", "simulation_gmapping.launch", plain=True, **given)
+    house = LaunchedHouse(folder, "rosbot_patrol", "simulation_gmapping.launch", plain=True, **given)
     try:
         house.start()
         house.wait(lambda: stem.with_suffix(".yaml").exists(), timeout, f"the map of {world}")

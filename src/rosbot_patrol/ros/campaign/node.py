@@ -161,7 +161,7 @@ class Campaign:
 
         def packed(number: int) -> tuple[str, bytes]:
             folder = self._planned(number)
-            house = base / HOUSE_FOLDER / self._houses.of(number).files.name
+            house = base / HOUSE_FOLDER / self._houses.name_of(number)
             return folder.name, pack(base, [folder, *([house] if house.is_dir() else [])])
 
         def take(name: str, problem: str, data: bytes) -> None:
@@ -210,13 +210,13 @@ class Campaign:
         patrol = plan_patrol(
             settings.seed,
             number,
-            place.files,
+            place.house.files,
             place.floor,
             faults=settings.faults,
             mix=settings.mix,
             is_light_drawn=not settings.is_own,
         )
-        return replace(patrol, people=(*patrol.people, *place.people))
+        return replace(patrol, people=(*patrol.people, *place.house.people))
 
     def _done(self, job: Job, problem: str) -> None:
         number = int(job.name)

@@ -51,6 +51,7 @@ from rosbot_patrol.simulation.hardware import Hardware, HardwareParams, mounted
 from rosbot_patrol.simulation.render.egl import make_renderer
 from rosbot_patrol.simulation.robot.description import RobotDescription, load_robot, parse_robot
 from rosbot_patrol.simulation.scenario.file import Scenario, Start, read_scenario
+from rosbot_patrol.simulation.scenario.furniture import move_furniture
 from rosbot_patrol.simulation.sdf.world import World, load_world
 from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
 from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
@@ -117,6 +118,8 @@ class Simulator:
             p = _set_by(scenario, p)
         folders, packages = model_folders(p.model_path), package_finder(p.model_path)
         world = load_world(p.world, folders, packages) if p.world else World()
+        if scenario is not None:
+            world = dataclasses.replace(world, bodies=move_furniture(world.bodies, scenario.furniture, scenario.file))
         places = read_sensors(p.motion_sensors)
         self._params = p
         renderer = partial(make_renderer, p.camera.renderer, p.camera.light)

@@ -69,6 +69,7 @@ from rosbot_patrol.sensors.sensor_file import SensorSpec
 from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
 from rosbot_patrol.simulation.scenario import file as scenario
 from rosbot_patrol.simulation.scenario.faults import KINDS, Doorway, Fault
+from rosbot_patrol.simulation.scenario.furniture import MovedFurniture
 
 # Title, namespace below the node's own, declaration.
 SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
@@ -161,6 +162,7 @@ SCENARIO: list[tuple[str, type]] = [
     ("walks[]", scenario.WalkEntry),
     ("doors[]", scenario.DoorEntry),
     ("door_moves[]", scenario.DoorMove),
+    ("furniture[]", MovedFurniture),
     ("doorways/<name>", Doorway),
     ("triggers[]", scenario.Trigger),
     ("expect", scenario.Expect),

@@ -1,4 +1,4 @@
-"""Scenario file: one yaml with world, seed, actors and their paths, doors, timed faults, and the expected outcome.
+"""Scenario file: one yaml with world, seed, actors, doors, moved furniture, timed faults, and the expected outcome.
 
     scenario = read_scenario("scenarios/intruder.yaml")
 
@@ -26,6 +26,7 @@ from rosbot_patrol.simulation.actors.doors import SPEED, SWING, DoorPlace, plain
 from rosbot_patrol.simulation.actors.walkers import Walker
 from rosbot_patrol.simulation.render.lights import LIGHTS
 from rosbot_patrol.simulation.scenario.faults import EVENTS, Doorway, Fault, Timed, finite, read_fault
+from rosbot_patrol.simulation.scenario.furniture import MovedFurniture
 from rosbot_patrol.yaml_files import read_mapping
 
 if TYPE_CHECKING:
@@ -168,6 +169,7 @@ class Scenario:
     walks: tuple[WalkEntry, ...] = ()
     doors: tuple[DoorEntry, ...] = ()
     door_moves: tuple[DoorMove, ...] = ()
+    furniture: tuple[MovedFurniture, ...] = ()
     doorways: dict[str, Doorway] = field(default_factory=dict)
     faults: tuple[Fault, ...] = ()
     triggers: tuple[Trigger, ...] = ()
@@ -192,6 +194,7 @@ _LISTS: dict[str, type] = {
     "walks": WalkEntry,
     "doors": DoorEntry,
     "door_moves": DoorMove,
+    "furniture": MovedFurniture,
     "triggers": Trigger,
 }
 

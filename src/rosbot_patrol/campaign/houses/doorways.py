@@ -1,0 +1,126 @@
+"""Doorways of a house, found by its walls, and doors in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.campaign.floor import CELL, Floor
+from rosbot_patrol.patrol.house.regions import NOBODYS
+from rosbot_patrol.simulation.scene.ways import EYE_LEVEL
+
+Array = NDArray[np.float64]
+
+_WIDTHS = (0.6, 1.25)  # of a doorway that a door fits into [m]
+_BEARINGS = 36  # directions in which its jambs are looked for
+_GAP = 0.04  # between leaf and jambs, together [m]
+_SWING = 1.55  # of an open door [rad]
+_TO_LEAF = 0.1  # steps along a leaf [m]
+
+
+@dataclass(frozen=True)
+class Doorway:
+    """A passage between two rooms, as wide as a door.
+
+    Attributes:
+        jambs: its ends, x, y [m], shape (2, 2).
+    """
+
+    jambs: Array
+
+    @property
+    def width(self) -> float:
+        """[m]."""
+        return float(np.hypot(*(self.jambs[1] - self.jambs[0])))
+
+    def door(self, name: str, *, at_second: bool, turns_left: bool) -> dict[str, Any]:
+        """An open door as a scenario's entry.
+
+        Args:
+            name: of the door.
+            at_second: hinged at the second jamb, else at the first.
+            turns_left: opens counter-clockwise.
+        """
+        hinge, other = self.jambs[::-1] if at_second else self.jambs
+        along = math.atan2(other[1] - hinge[1], other[0] - hinge[0])
+        return {
+            "name": name,
+            "hinge": [round(float(hinge[0]), 3), round(float(hinge[1]), 3), round(along, 4)],
+            "width": round(self.width - _GAP, 3),
+            "swing": _SWING if turns_left else -_SWING,
+            "opening": 1.0,
+        }
+
+
+def find_doorways(floor: Floor) -> list[Doorway]:
+    """Doorways between the rooms of a house, and between them and the robot's place.
+
+    Where the floors of two rooms meet, the jambs are the walls on both sides, in the direction where they are nearest.
+    """
+    cut = floor.ways.cut(EYE_LEVEL)
+    found = []
+    for x, y in _borders(floor):
+        ranges = cut.cast(x, y, 0.0, math.pi / _BEARINGS, 2 * _BEARINGS, longest=9.0)
+        widths = ranges[:_BEARINGS] + ranges[_BEARINGS:]
+        k = int(widths.argmin())
+        if not _WIDTHS[0] <= widths[k] <= _WIDTHS[1]:
+            continue
+        ahead = np.array([math.cos(k * math.pi / _BEARINGS), math.sin(k * math.pi / _BEARINGS)])
+        middle = np.array([x, y])
+        found.append(Doorway(np.stack([middle - ranges[k + _BEARINGS] * ahead, middle + ranges[k] * ahead])))
+    return found
+
+
+def _borders(floor: Floor) -> Iterator[tuple[float, float]]:
+    """Middles of the borders between two rooms, x, y [m]."""
+    labels = floor.regions.labels
+    pairs: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    for dy, dx in ((0, 1), (1, 0)):
+        here, there = labels[: -1 if dy else None, : -1 if dx else None], labels[dy:, dx:]
+        iy, ix = np.nonzero((here != there) & (here != NOBODYS) & (there != NOBODYS))
+        x, y = floor.plan.centres(ix, iy)
+        ends = np.sort(np.column_stack((here[iy, ix], there[iy, ix])), axis=1)
+        for (a, b), px, py in zip(ends.tolist(), x + dx * CELL / 2.0, y + dy * CELL / 2.0, strict=True):
+            pairs.setdefault((a, b), []).append((float(px), float(py)))
+    for points in pairs.values():
+        yield from _middles(np.array(points))
+
+
+def _middles(points: Array) -> Iterator[tuple[float, float]]:
+    """Middle of each group of neighbouring points, shape (N, 2)."""
+    left = np.ones(len(points), bool)
+    while left.any():
+        group = np.zeros(len(points), bool)
+        group[int(left.argmax())] = True
+        while True:
+            away = np.hypot(*(points[:, None] - points[None, group]).transpose(2, 0, 1)).min(axis=1)
+            more = left & (away < 2.0 * CELL)
+            if (more == group).all():
+                break
+            group = more
+        left &= ~group
+        yield tuple(points[group].mean(axis=0).tolist())
+
+
+def has_room_for(door: dict[str, Any], floor: Floor) -> bool:
+    """Whether nothing stands where the open leaf of a door is."""
+    x, y, along = door["hinge"]
+    bearing = along + door["swing"]
+    reach = np.arange(0.2, door["width"], _TO_LEAF)
+    ix = np.floor((x + reach * math.cos(bearing) - floor.info.origin_x) / CELL).astype(int)
+    iy = np.floor((y + reach * math.sin(bearing) - floor.info.origin_y) / CELL).astype(int)
+    inside = (ix >= 0) & (iy >= 0) & (ix < floor.info.width) & (iy < floor.info.height)
+    return bool(inside.all() and floor.open[iy, ix].all())
+
+
+def shuts(door: dict[str, Any], floor: Floor, room: int) -> bool:
+    """Whether the robot cannot get to a room's point while a door is shut."""
+    x, y, along = door["hinge"]
+    reach = np.arange(0.0, door["width"] + _TO_LEAF, CELL / 2.0)
+    leaf = np.column_stack((x + reach * math.cos(along), y + reach * math.sin(along)))
+    return floor.is_barred(room, leaf)

@@ -1,0 +1,86 @@
+"""A world as a patrol finds it: furniture moved, doors hung, and now and then one shut."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rosbot_patrol.campaign.floor import Floor
+from rosbot_patrol.campaign.houses.doorways import find_doorways, has_room_for, shuts
+from rosbot_patrol.campaign.houses.files import House, load_house
+from rosbot_patrol.campaign.houses.varied import vary
+from rosbot_patrol.campaign.mishaps import STRANDED
+from rosbot_patrol.campaign.plan import plan_patrol, scenario_text
+from rosbot_patrol.simulation.scenario.file import read_scenario
+
+
+@pytest.fixture(scope="module")
+def varied(flat: House, flat_floor: Floor) -> tuple[House, Floor]:
+    return vary(flat, flat_floor, np.random.default_rng(1))
+
+
+def test_the_doorways_of_the_flat(flat_floor: Floor) -> None:
+    widths = [(doorway.jambs.mean(axis=0), doorway.width) for doorway in find_doorways(flat_floor)]
+    expected = [((-1.1, 0.05), 0.9), ((2.1, 0.05), 0.9), ((-0.5, 2.35), 0.9), ((1.0, 1.6), 1.1)]
+    assert len(widths) == len(expected)
+    for (middle, width), (where, wide) in zip(widths, expected, strict=True):
+        assert middle == pytest.approx(where, abs=0.06)
+        assert width == pytest.approx(wide, abs=0.05)
+
+
+def test_a_shut_door_bars_the_rooms_behind_it(flat_floor: Floor) -> None:
+    *_, bath_or_bedroom, living = find_doorways(flat_floor)
+    by_name = {room.name: room.id for room in flat_floor.rooms}
+    door = living.door("door", at_second=False, turns_left=True)
+    barred = {name for name, room in by_name.items() if room and shuts(door, flat_floor, room)}
+    assert barred == {"living room and kitchen", "bedroom"}
+    door = bath_or_bedroom.door("door", at_second=True, turns_left=False)
+    assert {name for name, room in by_name.items() if room and shuts(door, flat_floor, room)} == {"bedroom"}
+
+
+def test_a_leaf_has_no_room_in_a_wall(flat_floor: Floor) -> None:
+    west = find_doorways(flat_floor)[0]
+    doors = [west.door("door", at_second=s, turns_left=t) for s in (False, True) for t in (False, True)]
+    found = [has_room_for(door, flat_floor) for door in doors]
+    assert any(found)
+    blocked = {**doors[0], "swing": 3.1}  # folded back along the wall
+    assert not has_room_for(blocked, flat_floor)
+
+
+def test_a_varied_house_has_moved_furniture_and_doors_and_every_room_is_reached(
+    flat: House, flat_floor: Floor, varied: tuple[House, Floor]
+) -> None:
+    house, floor = varied
+    entries = house.files.scenario
+    assert entries["furniture"]
+    assert entries["doors"]
+    for room in flat_floor.rooms:
+        before, after = (len(each.drive_to(room.id)) for each in (flat_floor, floor))
+        assert 0 < after <= 1.2 * before
+    moved = {each["name"] for each in entries["furniture"]}
+    was = {body.name: body.pose for body in flat.bodies}
+    assert {b.name for b in house.bodies if b.name in was and not np.allclose(b.pose, was[b.name])} == moved
+    again, _ = vary(flat, flat_floor, np.random.default_rng(1))
+    assert again.files == house.files
+    read = load_house(house.files)
+    assert [body.name for body in read.bodies] == [body.name for body in house.bodies]
+
+
+def test_now_and_then_the_door_to_the_room_is_shut(varied: tuple[House, Floor], tmp_path: Path) -> None:
+    house, floor = varied
+    patrols = [plan_patrol(5, number, house.files, floor) for number in range(30)]
+    shut = [patrol for patrol in patrols if patrol.mishap]
+    assert 0 < len(shut) < 10
+    for patrol in shut:
+        (door,) = [door for door in patrol.scenario["doors"] if door["opening"] == 0.0]
+        assert patrol.mishap == f"the door {door['name']} is shut"
+        assert patrol.allowed == STRANDED
+        assert shuts(door, floor, patrol.room)
+        file = tmp_path / f"{patrol.number}.yaml"
+        file.write_text(scenario_text(patrol))
+        assert any(each.name == door["name"] and each.opening == 0.0 for each in read_scenario(file).doors)
+        behind = load_house(replace(house.files, scenario={**house.files.scenario, "doors": patrol.scenario["doors"]}))
+        assert not len(Floor(behind.bodies, behind.rooms).drive_to(patrol.room))
