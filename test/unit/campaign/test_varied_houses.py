@@ -14,7 +14,10 @@ from rosbot_patrol.campaign.houses.files import House, load_house
 from rosbot_patrol.campaign.houses.varied import vary
 from rosbot_patrol.campaign.mishaps import STRANDED
 from rosbot_patrol.campaign.plan import plan_patrol, scenario_text
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.house.rooms import Room, load_rooms, save_rooms
 from rosbot_patrol.simulation.scenario.file import read_scenario
+from rosbot_patrol.simulation.sdf.world import load_world
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +32,29 @@ def test_the_doorways_of_the_flat(flat_floor: Floor) -> None:
     for (middle, width), (where, wide) in zip(widths, expected, strict=True):
         assert middle == pytest.approx(where, abs=0.06)
         assert width == pytest.approx(wide, abs=0.05)
+
+
+def test_furniture_and_corners_are_no_doorways(tmp_path: Path) -> None:
+    """A bed beside a bag leaves a passage as wide as a door, and so does the corner of two walls."""
+    walls = [("0 2", "6.2 0.2"), ("0 -2", "6.2 0.2"), ("3 0", "0.2 4.2"), ("-3 0", "0.2 4.2")]
+    parts = [("0 1.25", "0.2 1.5"), ("0 -1.25", "0.2 1.5")]  # a doorway of 1 m
+    bags = [("1.5 1.3", "0.2 1.4"), ("1.5 -1.0", "0.2 2.0")]
+    box = "<geometry><box><size>{} {} 2</size></box></geometry>"
+    models = "".join(
+        f"<model name='{kind}_{i}'><static>1</static><pose>{at} 1 0 0 0</pose><link name='l'>"
+        f"<collision name='c'>{box.format(*size.split())}</collision></link></model>"
+        for kind, shapes in (("wall", walls + parts), ("bag", bags))
+        for i, (at, size) in enumerate(shapes)
+    )
+    (tmp_path / "hall.world").write_text(f"<sdf version='1.6'><world name='w'>{models}</world></sdf>")
+    rooms = [("base", -1.5), ("middle", 0.75), ("east", 2.3)]
+    save_rooms(
+        tmp_path / "rooms.yaml", [Room(id=i, name=n, pose=Pose2D(x, 0.0, 0.0)) for i, (n, x) in enumerate(rooms)]
+    )
+    bodies = load_world(tmp_path / "hall.world").bodies
+    (doorway,) = find_doorways(Floor(bodies, load_rooms(tmp_path / "rooms.yaml")))
+    assert doorway.jambs.mean(axis=0) == pytest.approx([0.0, 0.0], abs=0.06)
+    assert doorway.width == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_shut_door_bars_the_rooms_behind_it(flat_floor: Floor) -> None:

@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.campaign.floor import CELL, Floor
 from rosbot_patrol.patrol.house.regions import NOBODYS
+from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies
 from rosbot_patrol.simulation.scene.ways import EYE_LEVEL
 
 Array = NDArray[np.float64]
 
 _WIDTHS = (0.6, 1.25)  # of a doorway that a door fits into [m]
 _BEARINGS = 36  # directions in which its jambs are looked for
+_ROUNDS = 2  # of looking for them again from between those of the one before
+_BEYOND = 0.6  # free way on both sides of a doorway [m]
 _GAP = 0.04  # between leaf and jambs, together [m]
 _SWING = 1.55  # of an open door [rad]
 _TO_LEAF = 0.1  # steps along a leaf [m]
@@ -61,19 +64,37 @@ def find_doorways(floor: Floor) -> list[Doorway]:
     """Doorways between the rooms of a house, and between them and the robot's place.
 
     Where the floors of two rooms meet, the jambs are the walls on both sides, in the direction where they are nearest.
+    The floors may meet beside the wall; half-way between its corners is nearer to its middle. In a world that names
+    nothing a wall, whatever is as high as the eyes is one.
     """
-    cut = floor.ways.cut(EYE_LEVEL)
+    walls = [body for body in floor.bodies if body.kind == "wall"]
+    cut = slice_bodies(walls or floor.bodies, EYE_LEVEL)
     found = []
-    for x, y in _borders(floor):
-        ranges = cut.cast(x, y, 0.0, math.pi / _BEARINGS, 2 * _BEARINGS, longest=9.0)
-        widths = ranges[:_BEARINGS] + ranges[_BEARINGS:]
-        k = int(widths.argmin())
-        if not _WIDTHS[0] <= widths[k] <= _WIDTHS[1]:
-            continue
-        ahead = np.array([math.cos(k * math.pi / _BEARINGS), math.sin(k * math.pi / _BEARINGS)])
-        middle = np.array([x, y])
-        found.append(Doorway(np.stack([middle - ranges[k + _BEARINGS] * ahead, middle + ranges[k] * ahead])))
+    for place in _borders(floor):
+        jambs = _jambs(cut, np.array(place))
+        for _ in range(_ROUNDS):
+            jambs = _jambs(cut, jambs.mean(axis=0))
+        doorway = Doorway(jambs)
+        if _WIDTHS[0] <= doorway.width <= _WIDTHS[1] and _leads_through(cut, jambs):
+            found.append(doorway)
     return found
+
+
+def _leads_through(cut: Slice, jambs: Array) -> bool:
+    """Whether it is free on both sides, which a corner between two walls is not."""
+    along = jambs[1] - jambs[0]
+    ahead = math.atan2(along[1], along[0]) + math.pi / 2.0
+    x, y = jambs.mean(axis=0)
+    return bool((cut.cast(x, y, ahead, math.pi, 2, longest=9.0) >= _BEYOND).all())
+
+
+def _jambs(cut: Slice, middle: Array) -> Array:
+    """Where opposite beams from a place end that are together the shortest, x, y [m], shape (2, 2)."""
+    x, y = middle
+    ranges = cut.cast(x, y, 0.0, math.pi / _BEARINGS, 2 * _BEARINGS, longest=9.0)
+    k = int((ranges[:_BEARINGS] + ranges[_BEARINGS:]).argmin())
+    ahead = np.array([math.cos(k * math.pi / _BEARINGS), math.sin(k * math.pi / _BEARINGS)])
+    return np.stack([middle - ranges[k + _BEARINGS] * ahead, middle + ranges[k] * ahead])
 
 
 def _borders(floor: Floor) -> Iterator[tuple[float, float]]:
