@@ -213,7 +213,7 @@ class Belief:
         hypothesis.scores.append(each.box.probability)
         if evidence.veto is not None:
             hypothesis.against[evidence.veto] += 1
-        elif not evidence.is_near:
+        elif not evidence.is_near or evidence.size is not None:
             hypothesis.possible += 1
         m = each.box.measured
         hypothesis.measured = m or hypothesis.measured
@@ -301,11 +301,11 @@ class Belief:
 
     def posterior(self, hypothesis: Hypothesis) -> float:
         """Probability of a person at a hypothesis."""
-        return hypothesis.posterior(self.params)
+        return hypothesis.posterior(self.params, self.likelihoods.calibration.fooled)
 
     def why(self, hypothesis: Hypothesis) -> str:
         """One sentence about a hypothesis."""
-        return hypothesis.why(self.params)
+        return hypothesis.why(self.params, self.likelihoods.calibration.fooled)
 
     def may_be_somebody(self, hypothesis: Hypothesis) -> bool:
         """Whether a hypothesis is not known to be nobody."""

@@ -61,6 +61,7 @@ class Calibration:
         sha256: of cfg and weights, "" for the cautious one.
         rho_person, rho_nobody: correlation of two pictures from one side, between 0 and 1.
         person, nobody: probability of each outcome, shape SHAPE; the last axis sums to 1.
+        fooled: probability that a pet fools it, from however many places it looks.
     """
 
     network: str
@@ -69,6 +70,7 @@ class Calibration:
     rho_nobody: float
     person: Array
     nobody: Array
+    fooled: float = 0.5
 
     def chances(self, at: Condition, threshold: float, *, is_person: bool) -> Array:
         """Probability of each outcome of a detector with a threshold; lower boxes count as none, shape (N,)."""
@@ -92,6 +94,7 @@ def save_calibration(path: Path, calibration: Calibration) -> None:
         "sha256": calibration.sha256,
         "rho_person": round(calibration.rho_person, 4),
         "rho_nobody": round(calibration.rho_nobody, 4),
+        "fooled_by_pets": round(calibration.fooled, 4),
         "edges": list(EDGES),
         "sizes": list(SIZES),
         "person": _rounded(calibration.person),
@@ -131,7 +134,10 @@ def _from_plain(tree: Any) -> Calibration:
         tables.append(table)
     if not all(0.0 < rho < 1.0 for rho in rhos):
         raise ValueError("a correlation is not between 0 and 1")
-    return Calibration(str(tree["network"]), str(tree["sha256"]), rhos[0], rhos[1], *tables)
+    fooled = float(tree.get("fooled_by_pets", CAUTIOUS.fooled))
+    if not 0.0 < fooled < 1.0:
+        raise ValueError("'fooled_by_pets' is no probability")
+    return Calibration(str(tree["network"]), str(tree["sha256"]), rhos[0], rhos[1], tables[0], tables[1], fooled)
 
 
 def _cautious() -> Calibration:

@@ -28,6 +28,8 @@ _PRIOR = 2.0  # boxes that a coarser table's shares of the bins are worth
 _PRIOR_BOXES = 0.5  # boxes that its rate of boxes is worth
 _RHOS = tuple(k / 50.0 for k in range(1, 50))
 _RHO_LEAST = 0.3  # with nobody: few boxes are persistent, and those are too few to show in some hundred sides
+_BOX = 0.1  # score from which a box around a pet counts
+_FOOLED_LEAST, _FOOLED_MOST = 0.01, 0.95  # no network is surely fooled, or never
 _FEWEST_GROUPS = 8  # sides with several pictures, to fit rho
 
 
@@ -39,12 +41,14 @@ class Samples:
         persons: condition and score (0: no box) of each picture of a person, by side; sides are any hashable key.
         false: likewise of boxes where nobody is.
         silent: pictures of a part of the view without a false box, by side.
+        pets: score (0: no box) of each picture of a pet, by side.
         pictures: number of pictures by light (bright, dark).
     """
 
     persons: dict[Hashable, list[tuple[Condition, float]]] = field(default_factory=lambda: defaultdict(list))
     false: dict[Hashable, list[tuple[Condition, float]]] = field(default_factory=lambda: defaultdict(list))
     silent: dict[Hashable, int] = field(default_factory=lambda: defaultdict(int))
+    pets: dict[Hashable, list[float]] = field(default_factory=lambda: defaultdict(list))
     pictures: list[int] = field(default_factory=lambda: [0, 0])
 
     @property
@@ -79,6 +83,23 @@ def fit(samples: Samples, network: str, sha256: str) -> Calibration:
     rhos = fit_rho(persons), max(fit_rho(nobodies), _RHO_LEAST)
     worths = tuple(1.0 / (1.0 + (_mean_size(g) - 1.0) * rho) for g, rho in zip((persons, nobodies), rhos, strict=True))
     return _tables(samples, network, sha256, rhos=rhos, worths=(worths[0], worths[1]))
+
+
+def fit_fooled(samples: Samples) -> float:
+    """Probability that a pet fools the network: how often pets have boxes, as a share of how often persons have."""
+    if not samples.pets:
+        return CAUTIOUS.fooled
+    pets = [_share(scores) for scores in samples.pets.values()]
+    persons = [_share(score for _, score in found) for found in samples.persons.values()]
+    fooled = (sum(pets) + _PRIOR_BOXES) / (len(pets) + 1.0)
+    found = max(sum(persons) / len(persons), fooled)
+    return min(max(fooled / found, _FOOLED_LEAST), _FOOLED_MOST)
+
+
+def _share(scores: Iterable[float]) -> float:
+    """Share of pictures with a box that counts."""
+    found = [score >= _BOX for score in scores]
+    return sum(found) / len(found)
 
 
 def fit_rho(sides: Sequence[Sequence[tuple[Array, int]]]) -> float:
@@ -141,7 +162,7 @@ def _tables(
     person, nobody = _smooth(person, CAUTIOUS.person), _smooth(nobody, CAUTIOUS.nobody)
     for cell in np.ndindex(*SHAPE[:3]):
         _make_rising(person[cell], nobody[cell])
-    return Calibration(network, sha256, *rhos, person, nobody)
+    return Calibration(network, sha256, rhos[0], rhos[1], person, nobody, fit_fooled(samples))
 
 
 def _smooth(counts: Array, prior: Array) -> Array:

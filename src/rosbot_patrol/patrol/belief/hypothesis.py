@@ -1,11 +1,10 @@
 """One hypothesis: somebody may be at a place, with the evidence for it by side of view.
 
-Three explanations compete: a person, a look-alike (a pet, a picture, a statue) and nobody. The scores tell the first
-two from the third; size and depth tell a person from a look-alike, by `Side.size`. A look-alike from near, where a part
-of it is in view, looks like a person to every network. Seen whole, it does so to some networks only: a missing box is
-expected there, but unlikely for a person. So evidence from near (`Side.near`) and of the whole (`Side.whole`) is kept
-apart. Sides are independent and add up. Pictures from one side are not independent: the same view is misjudged again
-and again.
+Four explanations compete: a person, a pet, a picture of a person, and nobody. The scores tell the others from nobody.
+The size tells a person from a pet, and depth from a picture (`Side.size`). A picture fools every network, and so does a
+part of a pet from near. Seen whole, a pet fools few networks: a missing box is expected there, but unlikely for a
+person. So evidence from near (`Side.near`) and of the whole (`Side.whole`) is kept apart. Sides are independent and add
+up. Pictures from one side are not independent: the same view is misjudged again and again.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ class Side:
         counts: pictures with each outcome, as far as the place was in view.
         near_sum, whole_sum: log-likelihood ratio of what pictures from near and of the whole say, of a person against
             nobody.
-        sizes, size_total: boxes, and sum of what their sizes say of a person against a look-alike.
+        sizes, size_total: boxes, and sum of what their sizes say of a person against a pet and against a picture.
     """
 
     eye: Pose2D
@@ -56,7 +55,7 @@ class Side:
     near_sum: float = 0.0
     whole_sum: float = 0.0
     sizes: int = 0
-    size_total: float = 0.0
+    size_total: Array = field(default_factory=lambda: np.zeros(2))
 
     def add(self, evidence: Evidence, calibration: Calibration) -> None:
         """Take one picture's evidence."""
@@ -68,7 +67,7 @@ class Side:
         self.counts[evidence.outcome] += evidence.weight
         if evidence.size is not None:
             self.sizes += 1
-            self.size_total += evidence.size
+            self.size_total = self.size_total + evidence.size
 
     def told(self, evidence: Evidence, calibration: Calibration) -> float:
         """What a further picture would add to `near_sum` or `whole_sum`."""
@@ -93,9 +92,9 @@ class Side:
         """Log-likelihood ratio of all pictures, of a person against nobody."""
         return self.near + self.whole
 
-    def size(self, params: BeliefParams) -> float:
-        """Log-likelihood ratio of all sizes; n correlated ones are worth n / (1 + (n - 1) rho)."""
-        return self.size_total / (1.0 + (self.sizes - 1.0) * params.size_rho) if self.sizes else 0.0
+    def size(self, params: BeliefParams) -> Array:
+        """Log-likelihood ratios of all sizes, shape (2,); n correlated ones are worth n / (1 + (n - 1) rho)."""
+        return self.size_total / (1.0 + max(self.sizes - 1.0, 0.0) * params.size_rho)
 
 
 def urn(counts: Array, outcome: int, chances: Array, rho: float) -> float:
@@ -209,15 +208,15 @@ class Hypothesis:
         """Median of the scores of its boxes, 0 without boxes."""
         return statistics.median_low(self.scores) if self.scores else 0.0
 
-    def size(self, params: BeliefParams) -> float:
-        """Log-likelihood ratio of size and depth, of a person against a look-alike."""
+    def size(self, params: BeliefParams) -> Array:
+        """Log-likelihood ratios of size and depth, of a person against a pet and against a picture, shape (2,)."""
         if not self.is_placed:
-            return math.inf
-        return sum(side.size(params) for side in self.sides)
+            return np.full(2, math.inf)
+        return sum((side.size(params) for side in self.sides), np.zeros(2))
 
-    def posterior(self, params: BeliefParams) -> float:
-        """Probability of a person there."""
-        return posterior(self.near, self.whole, self.size(params), params)
+    def posterior(self, params: BeliefParams, fooled: float) -> float:
+        """Probability of a person there; `fooled` is that of the network's calibration."""
+        return posterior(self.near, self.whole, self.size(params), params, fooled)
 
     def find_side(self, eye: Pose2D, params: BeliefParams) -> Side | None:
         """The known side that a camera sees, None if it is another one.
@@ -300,16 +299,17 @@ class Hypothesis:
         if pictures and number != self.number:
             self.together[number] += pictures
 
-    def why(self, params: BeliefParams) -> str:
+    def why(self, params: BeliefParams, fooled: float) -> str:
         """One sentence: what it is believed to be, and by what."""
         where = f"at about ({self.place[0]:.1f}, {self.place[1]:.1f})" if self.is_placed else "somewhere in view"
-        share = self.posterior(params)
+        share = self.posterior(params, fooled)
         if self.place_veto is not None or (self.veto is not None and share < params.clear_below):
             return f"what was seen {where} is no intruder: {self.veto_text}"
         said = [_said(side, self.from_place(side.eye)[1]) for side in self.sides]
         told = "; ".join(said) or "no picture tells"
-        is_sized = math.isfinite(self.size(params)) and any(side.sizes for side in self.sides)
-        size = f"; size and depth {self.size(params):+.1f}" if is_sized else ""
+        is_sized = self.is_placed and any(side.sizes for side in self.sides)
+        pet, picture = self.size(params)
+        size = f"; size {pet:+.1f} against a pet, depth {picture:+.1f} against a picture" if is_sized else ""
         near = "; it was too near to be told from a pet" if self.is_near_only else ""
         moved = "; the lidar saw it move" if self.moved else ""
         return f"a {self.label} {where} with probability {share:.0%}: {told}{size}{near}{moved}"
@@ -320,22 +320,25 @@ def _said(side: Side, away: float) -> str:
     return f"{boxes:.0f} boxes and {silent:.0f} pictures without one from {away:.1f} m ({side.score:+.1f})"
 
 
-def posterior(near: float, whole: float, size: float, params: BeliefParams) -> float:
+def posterior(near: float, whole: float, size: Array, params: BeliefParams, fooled: float) -> float:
     """Probability of a person, against a look-alike and nobody.
 
-    A look-alike seen whole fools the network, or it does not, with equal chances.
+    A picture of a person is one for any network. A pet, seen whole, fools the network or does not.
 
     Args:
         near: log-likelihood ratio of views from near and of motion, of a person or look-alike against nobody.
         whole: log-likelihood ratio of views of the whole, of a person against nobody.
-        size: log-likelihood ratio of size and depth, of a person against a look-alike.
+        size: log-likelihood ratios of size and depth, of a person against a pet and against a picture, shape (2,).
         params: prior of each.
+        fooled: probability that a pet fools the network.
     """
+    by_pet, by_picture = near - float(size[0]), near - float(size[1])
     logs = (
         math.log(params.prior) + near + whole,
-        math.log(0.5 * params.look_alikes) + near + whole - size,
-        math.log(0.5 * params.look_alikes) + near,
-        math.log(1.0 - params.prior - params.look_alikes),
+        math.log(params.pets * fooled) + by_pet + whole,
+        math.log(params.pets * (1.0 - fooled)) + by_pet,
+        math.log(params.pictures) + by_picture + whole,
+        math.log(1.0 - params.prior - params.pets - params.pictures),
     )
     most = max(logs)
     shares = [math.exp(each - most) for each in logs]

@@ -1,9 +1,9 @@
 """What one picture says about one place: how likely it is with a person there, with nobody, and with a look-alike.
 
 The score, or the lack of a box, tells a person from nobody. It does not tell a person from a pet, a poster or a statue:
-networks take those for persons. Size and depth do. Let q be the probability that a person has the measured size
-and depth: they contribute log(q / (1 - q)). A box without a measure, or so near that a pet looks like a person,
-contributes nothing and needs a second look.
+networks take those for persons. Size tells a person from a pet, depth from a picture. Let q be the probability that a
+person, and not such a look-alike, has what was measured: it contributes log(q / (1 - q)). A box without a measure, or
+so near that a pet looks like a person, contributes nothing and needs a second look.
 """
 
 from __future__ import annotations
@@ -49,17 +49,17 @@ class Evidence:
     Attributes:
         outcome: 0 for no box, else the bin of its score.
         person, nobody: probability of each outcome, shape (N,).
-        size: log-likelihood ratio of size and depth, of a person against a look-alike; None where
-            there is no box, or it is too near or too far off to be measured.
+        size: log-likelihood ratios of size and depth, of a person against a pet and against a picture, shape (2,); None
+            where there is no box, or it is too near or too far off to be measured.
         weight: probability that the place was in view.
-        is_near: the object is so near that it may be a pet as well.
+        is_near: only a part of the object is in view, for which any network takes a pet's as well.
         veto: why it is likely no person, None if it may be one.
     """
 
     outcome: int
     person: Array
     nobody: Array
-    size: float | None = None
+    size: Array | None = None
     weight: float = 1.0
     is_near: bool = False
     veto: Veto | None = None
@@ -107,21 +107,16 @@ class Likelihoods:
         least = math.exp(-self.params.picture_most)
         return _raised(person, least * nobody), _raised(nobody, least * person)
 
-    def _size(self, box: Box) -> tuple[float | None, bool, Veto | None]:
-        is_flat = box.measured is not None and box.measured.is_flat
-        if self.is_near(box) and not is_flat:
+    def _size(self, box: Box) -> tuple[Array | None, bool, Veto | None]:
+        m = box.measured
+        if self.is_near(box) and not (m is not None and m.is_flat):
             return None, True, None
         found = possibility(box, self.params)
-        if found is None:
+        if m is None or found is None:
             return None, False, None
-        q, veto = found
-        m = box.measured
-        if m is not None and box.label == "person":
-            if m.has_legs:
-                q = min(q, max(_PART, _taller_than_a_leg(m)))
-            elif m.is_flat is None and m.away > _FLAT_WITHIN and m.source != "lidar":  # what the lidar sees stands out
-                q = min(q, _PART)
-        return math.log(q / (1.0 - q)), False, veto
+        _, veto = found
+        against = _against_each(box, m, self.params).clip(_LEAST, 1.0 - _LEAST)
+        return np.log(against / (1.0 - against)), bool(m.has_legs), veto
 
     def is_near(self, box: Box) -> bool:
         """Whether so little of it is in the picture that a person and a pet look alike: legs, or a part at its side."""
@@ -170,6 +165,22 @@ def possibility(box: Box, params: BeliefParams) -> tuple[float, Veto | None] | N
     veto = min(shares, key=lambda each: shares[each])
     q = min(max(shares[veto], _LEAST), 1.0 - _LEAST)
     return q, veto if q < 0.5 else None
+
+
+def _against_each(box: Box, m: Measured, params: BeliefParams) -> Array:
+    """Probability that a person has a box's size and depth, and no pet, and no picture, shape (2,)."""
+    if m.is_flat:
+        return np.array([0.5, _LEAST])
+    if box.label != "person":
+        return np.full(2, 1.0)
+    shares = _shares(box, m, params)
+    body = min(shares[veto] for veto in shares if veto is not Veto.PET)
+    pet, picture = min(body, shares.get(Veto.PET, 1.0)), body
+    if m.has_legs:
+        pet = min(pet, max(_PART, _taller_than_a_leg(m)))
+    elif m.is_flat is None and m.away > _FLAT_WITHIN and m.source != "lidar":  # what the lidar sees stands out
+        picture = min(picture, _PART)
+    return np.array([pet, picture])
 
 
 def _shares(box: Box, m: Measured, p: BeliefParams) -> dict[Veto, float]:

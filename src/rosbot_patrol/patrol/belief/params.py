@@ -15,11 +15,9 @@ class BeliefParams:
     prior: float = param(0.01, lo=1e-6, hi=0.5, doc="probability of a person at any one place, before anything is seen")
     confirmed_above: float = param(0.95, lo=0.5, hi=1.0, doc="posterior above which a person is confirmed")
     clear_below: float = param(0.05, lo=0.0, hi=0.5, doc="posterior below which a place counts as empty")
-    look_alikes: float = param(
-        0.004,
-        lo=1e-6,
-        hi=0.5,
-        doc="probability of a pet, a picture or the like at any one place that the network takes for a person",
+    pets: float = param(0.004, lo=1e-6, hi=0.2, doc="probability of a pet at any one place")
+    pictures: float = param(
+        0.002, lo=1e-6, hi=0.2, doc="probability of a picture of a person, or the like, at any one place"
     )
     side_rho: float = param(
         0.3, lo=0.0, hi=1.0, doc="correlation of false boxes at one place from two sides: a lamp is one from everywhere"

@@ -19,6 +19,8 @@ from rosbot_patrol.patrol.visibility.coverage import Sight
 
 PERSONS = ("person", "hidden", "dark")
 """Kinds of scenes with a person."""
+PETS = ("dog", "cat")
+"""Kinds of scenes with a pet."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from rosbot_patrol.patrol.belief.calibration import Condition
 from rosbot_patrol.patrol.belief.fitting import Samples
 from rosbot_patrol.patrol.belief.likelihoods import possibility
 from rosbot_patrol.patrol.belief.params import BeliefParams
-from rosbot_patrol.patrol.belief.recorded import Scene
+from rosbot_patrol.patrol.belief.recorded import PETS, Scene
 from rosbot_patrol.patrol.records.inputs import Box, Eye
 
 Corners = tuple[float, float, float, float]
@@ -36,6 +36,9 @@ def add_scene(samples: Samples, scene: Scene, network: str) -> None:
             boxes = [box for box in frame.boxes if (possibility(box, params) or (1.0,))[0] >= 0.5]
             side = (scene.number, number)
             _add_picture(samples, person, boxes, (scene.columns, scene.rows), is_dark=scene.is_dark, side=side)
+            if scene.kind in PETS and truth is not None and _is_shown(truth, scene.columns):
+                scores = [box.probability for box in frame.boxes if _is_of(box, truth)]
+                samples.pets[side].append(max(scores, default=0.0))
             free = [box for box in boxes if truth is None or not _overlap(_corners(box), truth)]
             _add_nobody(samples, free, frame.eye, scene, side)
 
@@ -64,11 +67,16 @@ def _add_picture(
 ) -> None:
     if person is None:
         return
-    left, _, right, _ = person
-    if min(right, size[0]) - max(left, 0.0) < _SHOWN * (right - left):
+    if not _is_shown(person, size[0]):
         return
     scores = [box.probability for box in boxes if _is_of(box, person)]
     samples.persons[side].append((_condition(person, size, is_dark), max(scores, default=0.0)))
+
+
+def _is_shown(subject: Corners, columns: int) -> bool:
+    """Whether enough of a subject's columns are in the picture."""
+    left, _, right, _ = subject
+    return min(right, columns) - max(left, 0.0) >= _SHOWN * (right - left)
 
 
 def _add_nobody(samples: Samples, boxes: Sequence[Box], eye: Eye, scene: Scene, side: object) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.belief.belief import Belief
@@ -17,6 +18,8 @@ from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, Side, entropy, po
 from rosbot_patrol.patrol.belief.likelihoods import Evidence
 from rosbot_patrol.patrol.belief.params import BeliefParams
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
+
+Array = NDArray[np.float64]
 
 _PICTURES = 12  # of a look
 _SIZE = 3.0  # log-likelihood ratio of a first size, for a person
@@ -52,8 +55,10 @@ def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_o
     person, nobody = belief.likelihoods.chances(at)
     side = hypothesis.find_side(eye, p) or Side(eye)
     is_near = away < p.whole_from
-    size, more = hypothesis.size(p), 0.0 if is_near or side.sizes else _size_of_another_side(hypothesis, p)
-    now = hypothesis.posterior(p)
+    size, more = hypothesis.size(p), _size_of_another_side(hypothesis, p)
+    if is_near or side.sizes:
+        more = np.zeros(2)
+    now = belief.posterior(hypothesis)
     after = 0.0
     for k in np.flatnonzero(person > 0.0):
         one, none = (
@@ -64,13 +69,17 @@ def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_o
         for _ in range(_PICTURES):
             imagined.add(Evidence(int(k), person, nobody, is_near=is_near), calibration)
         then = posterior(
-            hypothesis.near + imagined.near, hypothesis.whole + imagined.whole, size + (more if k else 0.0), p
+            hypothesis.near + imagined.near,
+            hypothesis.whole + imagined.whole,
+            size + more if k else size,
+            p,
+            calibration.fooled,
         )
         after += (now * one + (1.0 - now) * none) * entropy(then)
     return entropy(now) - after
 
 
-def _size_of_another_side(hypothesis: Hypothesis, params: BeliefParams) -> float:
-    """Log-likelihood ratio of size that a new side will likely give: that of the known ones."""
+def _size_of_another_side(hypothesis: Hypothesis, params: BeliefParams) -> Array:
+    """Log-likelihood ratios of size that a new side will likely give, shape (2,): those of the known ones."""
     known = [side.size(params) for side in hypothesis.sides if side.sizes]
-    return sum(known) / len(known) if known else _SIZE
+    return np.mean(known, axis=0) if known else np.full(2, _SIZE)

@@ -23,7 +23,7 @@ from rosbot_patrol.patrol.belief.calibration import (
     read_calibration,
     save_calibration,
 )
-from rosbot_patrol.patrol.belief.fitting import Samples, fit, fit_rho, rising
+from rosbot_patrol.patrol.belief.fitting import Samples, fit, fit_fooled, fit_rho, rising
 from rosbot_patrol.patrol.belief.networks import find_calibration
 from rosbot_patrol.patrol.belief.samples import add_photograph
 from rosbot_patrol.patrol.records.inputs import Box
@@ -47,7 +47,7 @@ def test_round_trip(tmp_path: Path) -> None:
     save_calibration(path, calibration())
     found = read_calibration(path)
     assert found.network == "test"
-    assert (found.rho_person, found.rho_nobody) == (0.6, 0.3)
+    assert (found.rho_person, found.rho_nobody, found.fooled) == (0.6, 0.3, 0.5)
     np.testing.assert_allclose(found.person, calibration().person, atol=1e-8)
     np.testing.assert_allclose(found.nobody, calibration().nobody, atol=1e-8)
 
@@ -62,7 +62,10 @@ def test_garbage_is_refused_in_a_sentence(tmp_path: Path, text: str) -> None:
         read_calibration(path)
 
 
-@pytest.mark.parametrize(("key", "value"), [("rho_person", 1.5), ("rho_nobody", "x"), ("person", [1.0]), ("sizes", [])])
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("rho_person", 1.5), ("rho_nobody", "x"), ("person", [1.0]), ("sizes", []), ("fooled_by_pets", 1.0)],
+)
 def test_a_bad_value_is_refused(tmp_path: Path, key: str, value: object) -> None:
     path = tmp_path / "bad.json"
     save_calibration(path, calibration())
@@ -70,6 +73,26 @@ def test_a_bad_value_is_refused(tmp_path: Path, key: str, value: object) -> None
     path.write_text(json.dumps(tree))
     with pytest.raises(DetectorError, match="is no calibration"):
         read_calibration(path)
+
+
+def test_a_file_from_before_pets_were_counted_is_cautious_of_them(tmp_path: Path) -> None:
+    path = tmp_path / "old.json"
+    save_calibration(path, replace(calibration(), fooled=0.1))
+    assert read_calibration(path).fooled == 0.1
+    tree = json.loads(path.read_text())
+    del tree["fooled_by_pets"]
+    path.write_text(json.dumps(tree))
+    assert read_calibration(path).fooled == CAUTIOUS.fooled
+
+
+@pytest.mark.parametrize(("boxes", "low", "high"), [(0, 0.0, 0.03), (4, 0.08, 0.16), (40, 0.9, 1.0)])
+def test_how_many_pets_fool_a_network(boxes: int, low: float, high: float) -> None:
+    """Of forty looks at pets so many show a box in each picture; nine persons in ten have one."""
+    samples = photographs(0.9)
+    assert fit_fooled(samples) == CAUTIOUS.fooled  # nobody has shown it a pet
+    for k in range(40):
+        samples.pets[k] = [0.5 if k < boxes else 0.05] * 6
+    assert low < fit(samples, "test", "sum").fooled < high
 
 
 def test_a_file_that_is_gone(tmp_path: Path) -> None:

@@ -38,23 +38,37 @@ def whole(*sides: Side) -> Hypothesis:
     return Hypothesis(1, np.zeros(2), np.eye(2) * 0.04, 0.0, sides=list(sides))
 
 
+FOOLED = NETWORK.fooled
+
+
 def test_posterior_by_hand() -> None:
-    other = 0.002 * math.exp(2.0 + 5.0 - 3.0) + 0.002 * math.exp(2.0)
-    odds = 0.01 * math.exp(2.0 + 5.0) / (other + 0.986)
-    assert posterior(2.0, 5.0, 3.0, PARAMS) == pytest.approx(odds / (1.0 + odds))
-    assert posterior(0.0, 0.0, 0.0, PARAMS) == pytest.approx(PARAMS.prior)
-    assert posterior(1e6, 1e6, 1e6, PARAMS) == pytest.approx(1.0)
-    assert posterior(-1e6, -1e6, -1e6, PARAMS) == pytest.approx(0.0)
-    assert posterior(0.0, 1e6, math.inf, PARAMS) == pytest.approx(1.0)
+    pet = 0.004 * (FOOLED * math.exp(2.0 + 5.0 - 3.0) + (1.0 - FOOLED) * math.exp(2.0 - 3.0))
+    picture = 0.002 * math.exp(2.0 + 5.0 - 1.0)
+    odds = 0.01 * math.exp(2.0 + 5.0) / (pet + picture + 0.984)
+    assert posterior(2.0, 5.0, np.array([3.0, 1.0]), PARAMS, FOOLED) == pytest.approx(odds / (1.0 + odds))
+    assert posterior(0.0, 0.0, np.zeros(2), PARAMS, FOOLED) == pytest.approx(PARAMS.prior)
+    for all_, told in ((1e6, 1.0), (-1e6, 0.0)):
+        assert posterior(all_, all_, np.full(2, all_), PARAMS, FOOLED) == pytest.approx(told)
+    assert posterior(0.0, 1e6, np.full(2, math.inf), PARAMS, FOOLED) == pytest.approx(1.0)
 
 
 def test_without_a_size_a_look_alike_is_as_good_an_explanation() -> None:
-    assert posterior(50.0, 0.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.014)
-    assert posterior(0.0, 50.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.012)
+    assert posterior(50.0, 0.0, np.zeros(2), PARAMS, FOOLED) == pytest.approx(0.01 / 0.016)
+    assert posterior(0.0, 50.0, np.zeros(2), PARAMS, FOOLED) == pytest.approx(0.01 / (0.012 + 0.004 * FOOLED))
+
+
+@pytest.mark.parametrize("size", [0.0, -1.0, -5.0])
+def test_a_network_that_pets_rarely_fool_needs_less_of_a_size(size: float) -> None:
+    """Somebody who crouches is as low as a large dog; against a picture it takes depth as before."""
+    rarely, often = (posterior(0.0, 20.0, np.array([size, 5.0]), PARAMS, fooled) for fooled in (0.05, 0.5))
+    assert rarely > often
+    assert (rarely > 0.95) == (size == 0.0)
+    flat = [posterior(0.0, 20.0, np.array([3.0, -4.0]), PARAMS, fooled) for fooled in (0.05, 0.5)]
+    assert max(flat) < 0.1
 
 
 def test_a_pet_that_looked_alike_from_near_and_whole_does_not_is_no_person() -> None:
-    assert posterior(20.0, -10.0, 0.0, PARAMS) < 1e-3
+    assert posterior(20.0, -10.0, np.zeros(2), PARAMS, FOOLED) < 1e-3
 
 
 def test_urn_by_hand() -> None:
@@ -95,7 +109,7 @@ def test_one_side_alone_never_says_that_surely_nobody_is_there() -> None:
     """A network may find nobody in a rare pose, or behind a plant, in a hundred pictures alike."""
     hundred = side_of(*[0.0] * 100)
     assert hundred.score == pytest.approx(math.log(0.03))
-    assert whole(hundred).posterior(PARAMS) < 0.001
+    assert whole(hundred).posterior(PARAMS, FOOLED) < 0.001
     assert whole(hundred, hundred).whole == pytest.approx(2.0 * math.log(0.03))
 
 
@@ -156,8 +170,8 @@ def test_false_boxes_of_one_side_are_expected_from_the_next() -> None:
 def test_sizes_of_one_side_agree() -> None:
     side = Side(WEST)
     for _ in range(10):
-        side.add(said(0.9, size=2.0), NETWORK)
-    assert side.size(PARAMS) == pytest.approx(20.0 / (1.0 + 9.0 * PARAMS.size_rho))
+        side.add(said(0.9, size=np.array([2.0, 1.0])), NETWORK)
+    assert side.size(PARAMS) == pytest.approx(np.array([20.0, 10.0]) / (1.0 + 9.0 * PARAMS.size_rho))
 
 
 def test_a_veto_needs_most_boxes() -> None:
@@ -174,10 +188,10 @@ def test_a_veto_needs_most_boxes() -> None:
 def test_why_is_one_sentence() -> None:
     h = whole(side_of(0.9, 0.9, 0.0))
     h.boxes = h.possible = 2
-    assert h.why(PARAMS).startswith("a person at about (0.0, 0.0) with probability ")
-    assert "2 boxes and 1 pictures without one from 3.0 m" in h.why(PARAMS)
+    assert h.why(PARAMS, FOOLED).startswith("a person at about (0.0, 0.0) with probability ")
+    assert "2 boxes and 1 pictures without one from 3.0 m" in h.why(PARAMS, FOOLED)
     h.place_veto = Veto.OUTSIDE
-    assert h.why(PARAMS) == f"what was seen at about (0.0, 0.0) is no intruder: {Veto.OUTSIDE.value}"
+    assert h.why(PARAMS, FOOLED) == f"what was seen at about (0.0, 0.0) is no intruder: {Veto.OUTSIDE.value}"
 
 
 def test_the_place_of_a_walker_follows() -> None:
