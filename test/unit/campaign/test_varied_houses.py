@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rosbot_patrol.campaign.floor import Floor
-from rosbot_patrol.campaign.houses.doorways import find_doorways, has_room_for, shuts
+from rosbot_patrol.campaign.floor import CELL, Floor
+from rosbot_patrol.campaign.houses.doorways import find_doorways, leaf_cells, shuts
 from rosbot_patrol.campaign.houses.files import House, load_house
 from rosbot_patrol.campaign.houses.varied import vary
 from rosbot_patrol.campaign.mishaps import STRANDED
@@ -22,7 +22,7 @@ from rosbot_patrol.simulation.sdf.world import load_world
 
 @pytest.fixture(scope="module")
 def varied(flat: House, flat_floor: Floor) -> tuple[House, Floor]:
-    return vary(flat, flat_floor, np.random.default_rng(1))
+    return vary(flat, flat_floor, np.random.default_rng(6))
 
 
 def test_the_doorways_of_the_flat(flat_floor: Floor) -> None:
@@ -67,13 +67,14 @@ def test_a_shut_door_bars_the_rooms_behind_it(flat_floor: Floor) -> None:
     assert {name for name, room in by_name.items() if room and shuts(door, flat_floor, room)} == {"bedroom"}
 
 
-def test_a_leaf_has_no_room_in_a_wall(flat_floor: Floor) -> None:
+def test_an_open_leaf_stands_where_nothing_else_does(flat_floor: Floor) -> None:
     west = find_doorways(flat_floor)[0]
-    doors = [west.door("door", at_second=s, turns_left=t) for s in (False, True) for t in (False, True)]
-    found = [has_room_for(door, flat_floor) for door in doors]
-    assert any(found)
-    blocked = {**doors[0], "swing": 3.1}  # folded back along the wall
-    assert not has_room_for(blocked, flat_floor)
+    door = west.door("door", at_second=False, turns_left=True)
+    leaf = leaf_cells(door, flat_floor)
+    assert leaf.sum() == pytest.approx(0.7 / CELL, abs=2.0)
+    folded = leaf_cells({**door, "swing": 3.1}, flat_floor)  # back along the wall
+    assert not flat_floor.open[folded].any()
+    assert not leaf_cells({**door, "hinge": [90.0, 0.0, 0.0]}, flat_floor).any()
 
 
 def test_a_varied_house_has_moved_furniture_and_doors_and_every_room_is_reached(
@@ -89,8 +90,10 @@ def test_a_varied_house_has_moved_furniture_and_doors_and_every_room_is_reached(
     moved = {each["name"] for each in entries["furniture"]}
     was = {body.name: body.pose for body in flat.bodies}
     assert {b.name for b in house.bodies if b.name in was and not np.allclose(b.pose, was[b.name])} == moved
-    again, _ = vary(flat, flat_floor, np.random.default_rng(1))
+    again, _ = vary(flat, flat_floor, np.random.default_rng(6))
     assert again.files == house.files
+    leaves = [leaf_cells(door, flat_floor) for door in entries["doors"]]
+    assert all(flat_floor.open[leaf].all() for leaf in leaves)
     read = load_house(house.files)
     assert [body.name for body in read.bodies] == [body.name for body in house.bodies]
 

@@ -16,6 +16,7 @@ from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies
 from rosbot_patrol.simulation.scene.ways import EYE_LEVEL
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 _WIDTHS = (0.6, 1.25)  # of a doorway that a door fits into [m]
 _BEARINGS = 36  # directions in which its jambs are looked for
@@ -128,15 +129,16 @@ def _middles(points: Array) -> Iterator[tuple[float, float]]:
         yield tuple(points[group].mean(axis=0).tolist())
 
 
-def has_room_for(door: dict[str, Any], floor: Floor) -> bool:
-    """Whether nothing stands where the open leaf of a door is."""
+def leaf_cells(door: dict[str, Any], floor: Floor) -> Mask:
+    """Cells of the open leaf of a door, without those at its hinge, shape of the floor's grid."""
     x, y, along = door["hinge"]
     bearing = along + door["swing"]
-    reach = np.arange(0.2, door["width"], _TO_LEAF)
-    ix = np.floor((x + reach * math.cos(bearing) - floor.info.origin_x) / CELL).astype(int)
-    iy = np.floor((y + reach * math.sin(bearing) - floor.info.origin_y) / CELL).astype(int)
-    inside = (ix >= 0) & (iy >= 0) & (ix < floor.info.width) & (iy < floor.info.height)
-    return bool(inside.all() and floor.open[iy, ix].all())
+    mask = np.zeros(floor.info.shape, bool)
+    for reach in np.arange(0.2, door["width"], CELL / 2.0):
+        ix, iy = floor.info.cell_of(x + reach * math.cos(bearing), y + reach * math.sin(bearing))
+        if floor.info.contains_cell(ix, iy):
+            mask[iy, ix] = True
+    return mask
 
 
 def shuts(door: dict[str, Any], floor: Floor, room: int) -> bool:

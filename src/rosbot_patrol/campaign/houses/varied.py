@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.campaign.floor import CELL, PERSON_HEIGHTS, ROBOT_HEIGHTS, Floor
-from rosbot_patrol.campaign.houses.doorways import find_doorways, has_room_for
+from rosbot_patrol.campaign.houses.doorways import find_doorways, leaf_cells
 from rosbot_patrol.campaign.houses.files import House, changed_house
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.maps.raster import grown
 from rosbot_patrol.simulation.scenario.furniture import MovedFurniture, model_of, move_furniture
 from rosbot_patrol.simulation.scene.floor_plan import filled_cells
 from rosbot_patrol.simulation.scene.scene import Body
@@ -45,9 +46,15 @@ def vary(house: House, floor: Floor, rng: np.random.Generator) -> tuple[House, F
         The house, with the changes as entries of every scenario in it, and its floor as it is then.
     """
     ways = {room.id: len(floor.drive_to(room.id)) for room in floor.rooms}
+    models: dict[str, list[Body]] = defaultdict(list)
+    for body in house.bodies:
+        if body.kind not in ("floor", "wall", "door"):
+            models[model_of(body)].append(body)
+    cells = {name: _footprint(bodies, floor) for name, bodies in models.items()}
     for _ in range(_ATTEMPTS):
-        moved = _moved(house, floor, rng)
-        doors = _doors(floor, rng)
+        taken = np.logical_or.reduce([~floor.open, *cells.values()])
+        doors = _doors(floor, taken, rng)
+        moved = _moved(models, cells, taken, floor, rng)
         entries: dict[str, Any] = dict(house.files.scenario)
         if moved:
             entries["furniture"] = [{"name": each.name, "by": list(each.by)} for each in moved]
@@ -61,14 +68,18 @@ def vary(house: House, floor: Floor, rng: np.random.Generator) -> tuple[House, F
     return house, floor
 
 
-def _moved(house: House, floor: Floor, rng: np.random.Generator) -> list[MovedFurniture]:
-    """Pieces of furniture and their shifts, each to where nothing else stands."""
-    models: dict[str, list[Body]] = defaultdict(list)
-    for body in house.bodies:
-        if body.kind not in ("floor", "wall", "door"):
-            models[model_of(body)].append(body)
-    cells = {name: _footprint(bodies, floor) for name, bodies in models.items()}
-    taken = np.logical_or.reduce([~floor.open, *cells.values()])
+def _moved(
+    models: dict[str, list[Body]], cells: dict[str, Mask], taken: Mask, floor: Floor, rng: np.random.Generator
+) -> list[MovedFurniture]:
+    """Pieces of furniture and their shifts, each to where nothing else stands.
+
+    Args:
+        models: links by the name of the model.
+        cells: where each stands.
+        taken: cells where anything stands; receives those of moved pieces.
+        floor: of the house.
+        rng: chance.
+    """
     count = int(rng.integers(_MOST_MOVED + 1))
     moved: list[MovedFurniture] = []
     for name in rng.permutation(sorted(models)).tolist():
@@ -117,8 +128,8 @@ def _is_off_home(cells: Mask, floor: Floor) -> bool:
     return bool(np.hypot(x - base.x, y - base.y).min() > _HOME)
 
 
-def _doors(floor: Floor, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Open doors in some doorways, each hinged and opened where nothing is in its way."""
+def _doors(floor: Floor, taken: Mask, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Open doors in some doorways, each hinged and opened where nothing stands; `taken` receives their leaves."""
     doors = []
     for number, doorway in enumerate(find_doorways(floor)):
         drawn, sides = rng.random(), rng.permutation(4)
@@ -126,8 +137,10 @@ def _doors(floor: Floor, rng: np.random.Generator) -> list[dict[str, Any]]:
             continue
         for side in sides.tolist():
             door = doorway.door(f"hung_door_{number}", at_second=side >= 2, turns_left=side % 2 == 0)
-            if has_room_for(door, floor) and _is_off(door, floor.rooms.base.pose):
+            leaf = leaf_cells(door, floor)
+            if leaf.any() and not (leaf & taken).any() and _is_off(door, floor.rooms.base.pose):
                 doors.append(door)
+                taken |= grown(leaf, 1)
                 break
     return doors
 
