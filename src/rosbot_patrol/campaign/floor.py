@@ -90,18 +90,21 @@ class Floor:
 
     def leaves_way(self, room: int, x: float, y: float) -> bool:
         """Whether the robot still gets from the base to a room's point when a person stands at a place."""
-        apart = (BODY_RADIUS + ROBOT_RADIUS) / CELL + 1.0
+        apart = BODY_RADIUS + ROBOT_RADIUS + CELL
         cx, cy = self.info.cell_of(x, y)
         drive = self._cells_to(room)
-        if not len(drive) or np.hypot(drive[:, 0] - cx, drive[:, 1] - cy).min() > apart:
+        if not len(drive) or np.hypot(drive[:, 0] - cx, drive[:, 1] - cy).min() > apart / CELL:
             return bool(len(drive))
-        iy, ix = np.indices(self.info.shape)
-        way = self.drivable & (np.hypot(ix - cx, iy - cy) > apart)
-        start, goal = drive[0], drive[-1]
-        return bool(flood(way, int(start[0]), int(start[1]))[goal[1], goal[0]])
+        return not self.is_barred(room, np.array([[x, y]]), apart)
 
-    def is_barred(self, room: int, points: NDArray[np.float64]) -> bool:
-        """Whether something at points, x, y, shape (N, 2) [m], keeps the robot from a room that it could get to."""
+    def is_barred(self, room: int, points: NDArray[np.float64], apart: float = ROBOT_RADIUS) -> bool:
+        """Whether something at some points keeps the robot from a room that it could get to.
+
+        Args:
+            room: number of the room.
+            points: where it stands, x, y, shape (N, 2) [m].
+            apart: distance that the robot's centre keeps from them [m].
+        """
         drive = self._cells_to(room)
         if not len(drive):
             return False
@@ -110,7 +113,7 @@ class Floor:
             ix, iy = self.info.cell_of(float(x), float(y))
             if self.info.contains_cell(ix, iy):
                 mask[iy, ix] = True
-        way = self.drivable & ~grown(mask, ROBOT_RADIUS / CELL)
+        way = self.drivable & ~grown(mask, apart / CELL)
         return not bool(flood(way, *map(int, drive[0]))[drive[-1][1], drive[-1][0]])
 
     def share_seen(self, eye: Sequence[float], person: Sequence[float], posture: str = "") -> float:

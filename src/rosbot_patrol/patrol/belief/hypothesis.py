@@ -215,7 +215,7 @@ class Hypothesis:
         return sum((side.size(params) for side in self.sides), np.zeros(2))
 
     def posterior(self, params: BeliefParams, fooled: float) -> float:
-        """Probability of a person there; `fooled` is that of the network's calibration."""
+        """Probability of a person there, by a network that this share of pets fools."""
         return posterior(self.near, self.whole, self.size(params), params, fooled)
 
     def find_side(self, eye: Pose2D, params: BeliefParams) -> Side | None:
