@@ -221,14 +221,14 @@ def shrunk(mask: Mask, radius: float) -> Mask:
 
 
 def floor_info(bodies: Sequence[Body], source: str | Path = "the world") -> GridInfo:
-    """Grid that holds a world's walls with a margin.
+    """Grid that holds what stands in a world, be it as low as the walls of a maze, with a margin.
 
     Raises:
-        WorldError: nothing in it is as high as a wall.
+        WorldError: nothing in it is as high as the robot's camera.
     """
-    ends = np.vstack([slice_bodies(bodies, EYE_LEVEL).segments.reshape(-1, 2)])
+    ends = np.vstack([slice_bodies(bodies, height).segments.reshape(-1, 2) for height in (EYE, EYE_LEVEL)])
     if not len(ends):
-        raise WorldError(source, f"has no walls: nothing in it is {EYE_LEVEL:g} m high, so there are no rooms to guard")
+        raise WorldError(source, f"has no walls: nothing in it is {EYE:g} m high, so there are no rooms to guard")
     low, high = ends.min(axis=0) - 0.3, ends.max(axis=0) + 0.3
     width, height = (math.ceil(v / CELL) for v in high - low)
     return GridInfo(resolution=CELL, width=width, height=height, origin_x=float(low[0]), origin_y=float(low[1]))

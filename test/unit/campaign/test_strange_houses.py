@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rosbot_patrol.campaign.floor import Floor
+from rosbot_patrol.campaign.floor import Floor, floor_info
 from rosbot_patrol.campaign.houses.drawn import drawn_house_files
 from rosbot_patrol.campaign.houses.files import load_house, moved_scenario, read_house_folder, scenario_files
 from rosbot_patrol.campaign.houses.strange import check_start, find_start, house_of_world, moved_map
@@ -21,6 +21,7 @@ from rosbot_patrol.maps.map_io import read_map, write_map
 from rosbot_patrol.simulation.plans.catalogue import load_catalogue
 from rosbot_patrol.simulation.plans.drawn_house import SEEDS
 from rosbot_patrol.simulation.scenario.file import read_scenario
+from rosbot_patrol.simulation.scene.floor_plan import floor_plan
 from rosbot_patrol.simulation.sdf.world import World, load_world
 from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
@@ -76,25 +77,47 @@ def test_a_strange_world_becomes_a_house(tmp_path: Path, folder: Path) -> None:
     assert patrol.scenario["robot"] == {"x": 0.0, "y": 0.0, "yaw": 0.0}
 
 
-def test_where_a_robot_starts(tmp_path: Path) -> None:
-    with pytest.raises(WorldError, match=r"has no walls: nothing in it is 1\.\d+ m high"):
-        find_start(World(), tmp_path / "empty.world")
-    world = tmp_path / "box.world"
-    box = "<geometry><box><size>{} {} 2</size></box></geometry>"
-    walls = [("3 0", "0.2 6.2"), ("-3 0", "0.2 6.2"), ("0 3", "6.2 0.2"), ("0 -3", "6.2 0.2"), ("0 0", "1.5 1.5")]
+def boxes(*walls: tuple[str, str], height: float) -> str:
+    """World of boxes by their places "x y" and sizes "x y"."""
     models = "".join(
-        f"<model name='w{i}'><static>1</static><pose>{at} 1 0 0 0</pose><link name='l'>"
-        f"<collision name='c'>{box.format(*size.split())}</collision></link></model>"
+        f"<model name='w{i}'><static>1</static><pose>{at} {height / 2} 0 0 0</pose><link name='l'><collision name='c'>"
+        f"<geometry><box><size>{size} {height}</size></box></geometry></collision></link></model>"
         for i, (at, size) in enumerate(walls)
     )
-    world.write_text(f"<sdf version='1.6'><world name='w'>{models}</world></sdf>")
+    return f"<sdf version='1.6'><world name='w'>{models}</world></sdf>"
+
+
+def test_a_house_with_walls_that_a_person_looks_over(tmp_path: Path) -> None:
+    outer = [("4 0", "0.2 6.2"), ("-4 0", "0.2 6.2"), ("0 3", "8.2 0.2"), ("0 -3", "8.2 0.2")]
+    world = tmp_path / "low.world"
+    world.write_text(boxes(*outer, ("0 -1.9", "0.2 2.2"), ("0 1.6", "0.2 2.8"), height=0.6))
+    start = find_start(load_world(world), world)
+    bodies = load_world(world).bodies
+    info = dataclasses.replace(floor_info(bodies), resolution=0.05, width=172, height=132)
+    write_map(str(tmp_path / "map"), floor_plan(bodies, info, height=0.1, start=start[:2]))
+    files = house_of_world(world, tmp_path / "low", start, map_file=tmp_path / "map.yaml", read=load_world)
+    house = load_house(files)
+    floor = Floor(house.bodies, house.rooms)
+    assert len(read_sensors(str(files.sensors))) == len(house.rooms) - 1 == 2
+    patrols = [plan_patrol(1, number, files, floor) for number in range(5)]
+    starts = [actor["start"] for patrol in patrols for actor in patrol.scenario.get("actors", ()) if "start" in actor]
+    assert starts
+    assert all(floor.room_at(*start[:2]) > 0 for start in starts)
+
+
+def test_where_a_robot_starts(tmp_path: Path) -> None:
+    with pytest.raises(WorldError, match=r"has no walls: nothing in it is 0\.\d+ m high"):
+        find_start(World(), tmp_path / "empty.world")
+    world = tmp_path / "box.world"
+    outer = [("3 0", "0.2 6.2"), ("-3 0", "0.2 6.2"), ("0 3", "6.2 0.2"), ("0 -3", "6.2 0.2")]
+    world.write_text(boxes(*outer, ("0 0", "1.5 1.5"), height=2.0))
     start = find_start(load_world(world), world)  # a pillar stands at the origin
     assert 1.0 < max(abs(start.x), abs(start.y)) < 1.6
     check_start(load_world(world), world, start)
     for place in (Pose2D(3.0, 0.0, 0.0), Pose2D(90.0, 0.0, 0.0)):
         with pytest.raises(WorldError, match=r"has no room for the robot at .*; the nearest place for it is \("):
             check_start(load_world(world), world, place)
-    world.write_text(world.read_text().replace("<size>1.5 1.5 2</size>", "<size>5.6 5.6 2</size>"))
+    world.write_text(boxes(*outer, ("0 0", "5.6 5.6"), height=2.0))
     with pytest.raises(WorldError, match="has no place from which the robot reaches 6 m2 of floor"):
         find_start(load_world(world), world)
 

@@ -48,15 +48,13 @@ def suggest_rooms(floor: Floor, start: Pose2D) -> Rooms:
     """
     reached = reached_from(floor, start)
     labels = _parts(np.where(reached, floor.clearance, 0.0), floor.cell_area)
-    found: list[tuple[float, float, float]] = []
-    for label in np.unique(labels[labels >= 0]):
-        mask = labels == label
-        if mask.sum() * floor.cell_area < _AREA:
-            continue
-        for share in _shares(floor, mask):
-            x, y = point_of(floor, share)
-            if math.dist((x, y), start[:2]) >= _APART:
-                found.append((float(share.sum()), x, y))
+    masks = [labels == label for label in np.unique(labels[labels >= 0])]
+    shares = [share for mask in masks if mask.sum() * floor.cell_area >= _AREA for share in _shares(floor, mask)]
+    found = _points(floor, shares, start)
+    if not found:  # a house of one room, in the middle of which the robot waits
+        iy, ix = np.indices(floor.info.shape)
+        far = np.hypot(*np.subtract(floor.centres(ix, iy), np.array(start[:2])[:, None, None])) >= _APART
+        found = _points(floor, [share & far for share in shares if (share & far).any()], start)
     if not found:
         raise MapError(
             "the map", f"has no room of {_AREA:g} m2 that can be reached from ({start.x:.2f}, {start.y:.2f})"
@@ -65,6 +63,12 @@ def suggest_rooms(floor: Floor, start: Pose2D) -> Rooms:
     rooms = [Room(id=0, name="base", pose=start)]
     rooms += [Room(id=i, name=f"room {i}", pose=Pose2D(x, y, 0.0)) for i, (_, x, y) in enumerate(found, 1)]
     return Rooms(tuple(rooms), "the map")
+
+
+def _points(floor: Floor, shares: list[NDArray[np.bool_]], start: Pose2D) -> list[tuple[float, float, float]]:
+    """Number of cells and point of each share, without those whose point lies beside the base."""
+    points = [(float(share.sum()), *point_of(floor, share)) for share in shares]
+    return [point for point in points if math.dist(point[1:], start[:2]) >= _APART]
 
 
 def reached_from(floor: Floor, start: Pose2D) -> NDArray[np.bool_]:

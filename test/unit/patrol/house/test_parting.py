@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -40,8 +41,10 @@ def test_rooms_end_at_doors() -> None:
 def test_one_hall_is_one_room_and_the_base_is_none() -> None:
     floor = drawn("#######", "#.....#", "#.....#", "#.....#", "#######")
     assert len(suggest_rooms(floor, Pose2D(1.5, 1.5, 0.0))) == 2
+    (base, room) = suggest_rooms(floor, Pose2D(3.5, 2.5, 0.0))  # its middle is taken
+    assert 1.5 <= math.dist(base.pose[:2], room.pose[:2]) < 2.0
     with pytest.raises(MapError, match="has no room of 2 m2 that can be reached"):
-        suggest_rooms(floor, Pose2D(3.5, 2.5, 0.0))
+        suggest_rooms(drawn("####", "#..#", "#..#", "####"), Pose2D(2.0, 2.0, 0.0))
 
 
 def test_what_cannot_be_reached_is_no_room() -> None:
