@@ -31,7 +31,9 @@ _REFUSED = 0.4  # radius around a place that was not reached, in which no goal i
 class FrontierParams:
     """Frontiers that are worth a drive."""
 
-    robot_radius: float = param(0.2, unit="m", lo=0.05, doc="minimum distance of goals and routes from obstacles")
+    robot_radius: float = param(
+        0.22, unit="m", lo=0.05, doc="minimum distance of goals and routes from obstacles, above move_base's own"
+    )
     frontier_length: float = param(0.5, unit="m", lo=0.05, doc="minimum length of a frontier")
     frontier_clearance: float = param(
         0.12, unit="m", lo=0.0, doc="minimum distance of a frontier from obstacles: beams pass along walls"

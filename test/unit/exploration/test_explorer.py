@@ -167,6 +167,16 @@ def test_borders_that_are_short_or_out_of_reach_are_left_alone() -> None:
     assert shut.frontiers() == []  # the door is too narrow for it
 
 
+@pytest.mark.parametrize(("cells_wide", "is_way"), [(8, False), (9, True), (12, True)])
+def test_a_gap_that_move_base_refuses_once_in_a_while_is_no_way(cells_wide: int, is_way: bool) -> None:
+    cells = HOUSE.cells.copy()
+    cells[70:90, 70:75] = 100  # the gap between the upper rooms, made narrower
+    cells[75 : 75 + cells_wide, 70:75] = 0
+    cells[70:-1, 110:-1] = -1  # of the room beyond, only the floor behind the gap is known
+    found = Borders(Grid(HOUSE.info, cells), START, FrontierParams()).frontiers()
+    assert bool(found) == is_way
+
+
 def test_a_robot_off_the_map_reaches_nothing() -> None:
     assert Borders(HOUSE, Pose2D(50.0, 50.0, 0.0), FrontierParams()).frontiers() == []
     assert Borders(HOUSE, Pose2D(-50.0, 2.0, 0.0), FrontierParams()).frontiers() == []
