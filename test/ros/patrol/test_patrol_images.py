@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 import rospy
 from sensor_msgs.msg import Image
 
+from rosbot_patrol.alerts.pictures.ring import EvidenceParams
 from rosbot_patrol.ros.patrol import pictures as patrol_images
 from rosbot_patrol.ros.patrol.pictures import PictureRing, is_black, mean_of
 
@@ -30,22 +32,52 @@ def test_a_dark_room_with_a_lamp_in_it_shows_something() -> None:
     assert not is_black(picture.tobytes())
 
 
-def test_a_camera_that_hangs_shows_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    stores = []
+@pytest.fixture
+def stores(monkeypatch: pytest.MonkeyPatch) -> list[Callable[[Image], None]]:
+    """Filled with what a ring that is started does with a picture."""
+    found: list[Callable[[Image], None]] = []
 
-    def subscribe(topic, kind, store, **options):
-        stores.append(store)
+    def subscribe(topic: str, kind: type, store: Callable[[Image], None], **options: object) -> SimpleNamespace:
+        found.append(store)
         return SimpleNamespace(unregister=lambda: None)
 
     monkeypatch.setattr(rospy, "Subscriber", subscribe)
     monkeypatch.setattr(patrol_images, "now", lambda: 1.0)
+    return found
+
+
+def picture_of(stamp: float, level: int) -> Image:
+    picture = Image(width=2, height=1, encoding="mono8", step=2, data=bytes([level, level]))
+    picture.header.stamp = rospy.Time.from_sec(stamp)
+    return picture
+
+
+def test_a_picture_that_shows_somebody_is_kept_until_it_is_known_who_it_is(stores) -> None:
+    ring = PictureRing("/camera", EvidenceParams(evidence_before=1.0))
+    ring.start()
+    for stamp in range(100, 130):
+        stores[0](picture_of(stamp, stamp))
+        if stamp == 105:
+            ring.keep([105.0])
+        if stamp == 110:
+            ring.keep([110.0, 105.0, 90.0])  # of 90 there is none
+    assert ring.find(105.0).data == bytes([105, 105])
+    assert ring.find(104.0, tolerance=2.0).stamp == 105.0
+    assert ring.find(120.0) is None
+    assert ring.find(129.0).stamp == 129.0
+    ring.keep([110.0])
+    assert ring.find(105.0) is None
+    assert ring.find(110.0).stamp == 110.0
+    ring.stop()
+    assert ring.find(110.0) is None
+
+
+def test_a_camera_that_hangs_shows_the_same_picture(stores) -> None:
     ring = PictureRing("/camera")
     assert not ring.is_same(None)
     ring.start()
     for stamp, level in ((1, 10), (2, 20), (3, 20), (4, 20), (6, 30), (7, 40)):
-        picture = Image(width=2, height=1, encoding="mono8", step=2, data=bytes([level, level]))
-        picture.header.stamp = rospy.Time(stamp)
-        stores[0](picture)
+        stores[0](picture_of(stamp, level))
         if stamp == 4:
             assert ring.is_same(5.0)  # what comes after it, before its own picture is here
             assert ring.is_same(None)

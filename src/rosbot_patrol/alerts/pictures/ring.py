@@ -44,14 +44,19 @@ class EvidenceRing:
         seconds: how far back it reaches.
         rate: older pictures are thinned to this rate [Hz].
         max_bytes: of all pictures together; 40 MB hold 43 raw ones of 640 x 480, or 1,000 compressed ones.
-        fresh: pictures younger than this [s] are all kept.
+        fresh: pictures younger than this [s] are all kept, as long as they take no more than half of the memory.
     """
 
     def __init__(self, *, seconds: float, rate: float, max_bytes: float, fresh: float = 3.0) -> None:
         self._seconds, self._gap, self._max_bytes, self._fresh = seconds, 1.0 / rate, max_bytes, fresh
         self._old: deque[Picture] = deque()
         self._new: deque[Picture] = deque()
-        self.bytes = 0
+        self._old_bytes = self._new_bytes = 0
+
+    @property
+    def bytes(self) -> int:
+        """Of all pictures together."""
+        return self._old_bytes + self._new_bytes
 
     def __len__(self) -> int:
         return len(self._old) + len(self._new)
@@ -64,27 +69,27 @@ class EvidenceRing:
     def snapshot(self) -> EvidenceRing:
         """A copy of the ring, for another thread."""
         other = EvidenceRing(seconds=self._seconds, rate=1.0 / self._gap, max_bytes=self._max_bytes, fresh=self._fresh)
-        other._old, other._new, other.bytes = self._old.copy(), self._new.copy(), self.bytes
+        other._old, other._new = self._old.copy(), self._new.copy()
+        other._old_bytes, other._new_bytes = self._old_bytes, self._new_bytes
         return other
 
     def clear(self) -> None:
         """Forget all."""
         self._old.clear()
         self._new.clear()
-        self.bytes = 0
+        self._old_bytes = self._new_bytes = 0
 
     def add(self, picture: Picture) -> None:
         """Take a picture; one that is older than the newest means that the clock went back: all others go."""
         if self.newest is not None and picture.stamp < self.newest.stamp:
             self.clear()
         self._new.append(picture)
-        self.bytes += len(picture.data)
-        while self._new[0].stamp < picture.stamp - self._fresh:
+        self._new_bytes += len(picture.data)
+        first_fresh, first_kept = picture.stamp - self._fresh, picture.stamp - self._seconds
+        while len(self._new) > 1 and (self._new[0].stamp < first_fresh or 2 * self._new_bytes > self._max_bytes):
             self._thin(self._new.popleft())
-        while self._old and self._old[0].stamp < picture.stamp - self._seconds:
-            self.bytes -= len(self._old.popleft().data)
-        while self.bytes > self._max_bytes and len(self) > 1:
-            self.bytes -= len((self._old or self._new).popleft().data)
+        while self._old and (self._old[0].stamp < first_kept or self.bytes > self._max_bytes):
+            self._old_bytes -= len(self._old.popleft().data)
 
     def find(self, stamp: float, tolerance: float) -> Picture | None:
         """The picture nearest to a time [s], None if none lies within the tolerance."""
@@ -102,10 +107,10 @@ class EvidenceRing:
         return taken
 
     def _thin(self, picture: Picture) -> None:
-        if self._old and picture.stamp - self._old[-1].stamp < self._gap * 0.95:
-            self.bytes -= len(picture.data)
-        else:
+        self._new_bytes -= len(picture.data)
+        if not self._old or picture.stamp - self._old[-1].stamp >= self._gap * 0.95:
             self._old.append(picture)
+            self._old_bytes += len(picture.data)
 
 
 @dataclass(kw_only=True)

@@ -320,6 +320,11 @@ class Belief:
                 found[hypothesis.veto_text] += hypothesis.boxes
         return found
 
+    def pictures(self, most: int) -> tuple[float, ...]:
+        """Stamps of the pictures that show the most probable hypotheses best [s]."""
+        shown = [h for h in self.hypotheses if h.best is not None and h.place_veto is None]
+        return tuple(h.picture for h in sorted(shown, key=self.posterior, reverse=True)[:most])
+
     @property
     def open(self) -> Sequence[Hypothesis]:
         """Hypotheses that are neither confirmed nor below `clear_below`, the most probable first."""

@@ -29,6 +29,7 @@ _RECENT = 0.6  # [s] since a picture showed somebody: they are in view
 _LATELY = 3.0  # [s] age of the pictures that count for stopping
 _SHOWN = 0.4  # score of the other boxes that a picture for the owner shows
 _OLDEST = 10.0  # [s] age of a picture that still counts
+_PICTURES = 8  # kept until it is known whether they show an intruder
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +72,7 @@ class IntruderDecision:
 
     Attributes:
         belief: who may be in the house.
+        pictures: stamps of the camera's pictures that the owner would want to see of them [s].
     """
 
     def __init__(
@@ -82,6 +84,7 @@ class IntruderDecision:
     ) -> None:
         self._rooms, self._params, self._known, self._network = rooms, params, known, network
         self.belief = self._belief_of(Network())
+        self.pictures: tuple[float, ...] = ()
         self._persons = Persons(params.people)
         self._camera_tracking = CameraTracking(params.track)
         self._showing: deque[tuple[float, bool]] = deque(maxlen=3)  # arrival of a picture, whether it shows somebody
@@ -104,6 +107,7 @@ class IntruderDecision:
         """
         self.belief = self._belief_of(self._network())
         self.belief.start(now)
+        self.pictures = ()
         self._camera_tracking.reset()
         self._showing.clear()
         self._persons = Persons(self._params.people)
@@ -127,6 +131,8 @@ class IntruderDecision:
             if frame.stamp is not None and now - frame.stamp > _OLDEST:
                 continue
             shown = self.belief.see(now, frame, PictureView(self._sight(inputs, frame.eye), frame.is_dark))
+            if shown:
+                self.pictures = self.belief.pictures(_PICTURES)
             findings += [self._find(now, each, inputs.house, frame.eye) for each in shown if each.is_confirmed]
             somebody = [each for each in shown if each.last in frame.boxes and self.belief.may_be_somebody(each)]
             is_early = not frame.counts and bool(self.belief.plausible(frame))  # it cannot be judged yet

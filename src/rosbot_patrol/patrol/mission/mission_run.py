@@ -198,6 +198,7 @@ class MissionRun:
         for finding in decision.see(now, inputs, self._parts.views.tracks()):
             self._note(finding, inputs, out)
             out.people = tuple(decision.met)
+        out.pictures = decision.pictures
 
     def _note(self, finding: Finding, inputs: Inputs, out: Commands) -> None:
         mission, seen = self.mission, finding.seen

@@ -99,6 +99,7 @@ class Commands:
         suspects: what looked like somebody on the mission that ended, one sentence each.
         words: for the owner.
         people: those met on the mission, where one of them was seen in this step.
+        pictures: stamps of the camera's pictures to be kept [s], None for the same as before.
         changed: what has to outlive the program has changed.
     """
 
@@ -114,4 +115,5 @@ class Commands:
     suspects: tuple[str, ...] = ()
     words: tuple[OwnerMessage, ...] = ()
     people: tuple[Person, ...] = ()
+    pictures: tuple[float, ...] | None = None
     changed: bool = False

@@ -304,6 +304,8 @@ class PatrolNode:
         self._wheels.turn(commands.speed)
         if commands.report is not None:
             self._state.publish(time_now, commands.report, self.manager.mission)
+        if commands.pictures is not None:
+            self.pictures.keep(commands.pictures)
         for alarm in commands.alarms:
             self.desk.take(alarm, time_now)
         commands.words += self.neighbour.step()

@@ -1,5 +1,7 @@
 """Ring of the camera's last pictures, filled only when needed; detects black and repeated pictures.
 
+Somebody may be confirmed long after the picture that shows them best: such pictures are kept until then (`keep`).
+
 A covered or hung camera still sends. A black picture counts as none; a picture that equals its predecessor byte for
 byte is not new (a real camera's noise never repeats).
 """
@@ -9,6 +11,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Sequence
 
 import rospy
 from sensor_msgs.msg import Image
@@ -21,6 +24,7 @@ _SAMPLED = 211  # one byte of this many is checked: 4,367 of a picture of 640 x 
 _DARK = 40  # of 255: mean of a picture in little light
 _BLACK = 12  # of 255: a covered camera's noise stays below
 _MB = 1_000_000
+_SAME = 0.002  # [s] stamps that differ by less are of one picture
 
 
 class PictureRing:
@@ -41,6 +45,7 @@ class PictureRing:
         self._seen_at = self._changed_at = float("-inf")
         self._same: deque[float] = deque(maxlen=200)  # stamps of pictures equal to their predecessors
         self._same_since: float | None = None  # stamp of the first of the present series
+        self._kept: dict[float, Picture] = {}  # by the stamps that are asked for
         self._is_dark = False
 
     @property
@@ -63,7 +68,7 @@ class PictureRing:
         with self._lock:
             if self._same_since is not None and (stamp is None or stamp >= self._same_since):
                 return True
-            return stamp is not None and any(abs(stamp - same) <= 0.002 for same in self._same)
+            return stamp is not None and any(abs(stamp - same) <= _SAME for same in self._same)
 
     @property
     def is_dark(self) -> bool:
@@ -84,6 +89,7 @@ class PictureRing:
             self._subscriber = None
         with self._lock:
             self._ring.clear()
+            self._kept.clear()
             self._same.clear()
             self._same_since = None
             self._seen_at = self._changed_at = float("-inf")
@@ -93,10 +99,20 @@ class PictureRing:
         with self._lock:
             return self._ring.snapshot()
 
-    def find(self, stamp: float, tolerance: float = 0.002) -> Picture | None:
+    def find(self, stamp: float, tolerance: float = _SAME) -> Picture | None:
         """Picture nearest to a time [s], None if there is none within the tolerance."""
         with self._lock:
-            return self._ring.find(stamp, tolerance)
+            near = [p for p in self._kept.values() if abs(p.stamp - stamp) <= tolerance]
+            found = self._ring.find(stamp, tolerance)
+            return min(near if found is None else [found, *near], key=lambda p: abs(p.stamp - stamp), default=None)
+
+    def keep(self, stamps: Sequence[float]) -> None:
+        """Keep the pictures of these times [s], however long, and no others."""
+        if tuple(self._kept) == tuple(stamps):
+            return
+        with self._lock:
+            found = ((stamp, self._kept.get(stamp) or self._ring.find(stamp, _SAME)) for stamp in stamps)
+            self._kept = {stamp: picture for stamp, picture in found if picture is not None}
 
     def wait_for(self, stamp: float, seconds: float) -> Picture | None:
         """Call `find` repeatedly for some seconds of wall time; for threads that may wait."""

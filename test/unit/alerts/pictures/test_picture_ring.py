@@ -38,6 +38,15 @@ def test_memory_is_bounded():
     assert ring.newest.stamp == pytest.approx(60.0)
 
 
+def test_where_memory_is_short_the_newest_leave_room_for_the_seconds_before():
+    ring = EvidenceRing(seconds=6.0, rate=5.0, max_bytes=43 * len(raw(0.0).data))
+    fill(ring, 100.0, 110.0, hz=30.0)
+    assert ring.bytes <= 43 * len(raw(0.0).data)
+    stamps = [p.stamp for p in (*ring._old, *ring._new)]
+    assert stamps[0] < 106.0  # it reached back to 108.6
+    assert [s for s in stamps if s > 109.4] == pytest.approx([109.4 + i / 30 for i in range(1, 19)])
+
+
 def test_one_huge_picture_is_kept_alone():
     ring = EvidenceRing(seconds=5.0, rate=5.0, max_bytes=1000)
     ring.add(raw(1.0))

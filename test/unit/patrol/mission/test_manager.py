@@ -1,10 +1,11 @@
 """The patrol in a small world: a robot that glides to goals and turns by command, a detector that sees by room."""
 
+import dataclasses
 import math
 
 import pytest
 from belief_pictures import good_network
-from patrol_world import ROOMS, World, looking, phase
+from patrol_world import PERSON, ROOMS, World, looking, phase
 
 from rosbot_patrol.goal import GoalLink, GoalState
 from rosbot_patrol.patrol.calls.queue import MissionQueue
@@ -35,6 +36,16 @@ def test_a_person_makes_one_notice_and_the_verdict():
     assert world.notices[0].phase is Phase.LOOKING
     assert mission.sightings > 10
     assert abs(math.degrees(world.yaw) - 360) < 6
+
+
+def test_the_picture_that_a_notice_speaks_of_is_kept_until_then():
+    world, sure = World(person_when=looking), dataclasses.replace(PERSON, probability=0.95)
+    world.boxes = lambda w: (PERSON if any(out.pictures for out in w.all) else sure,)
+    world.triggers = [2]
+    world.run(lambda w: w.notices)
+    first = next(k for k, out in enumerate(world.all) if out.pictures)
+    assert first < len(world.all) - 3  # more pictures were needed
+    assert {out.pictures for out in world.all[first:]} == {(world.notices[0].seen.stamp,)}
 
 
 @pytest.mark.parametrize("when", [Phase.DRIVING, Phase.RETURNING])
