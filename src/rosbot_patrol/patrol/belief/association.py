@@ -1,4 +1,7 @@
-"""Which box belongs to which hypothesis: the nearest by Mahalanobis distance in the map, one box each, within a gate.
+"""Which box belongs to which hypothesis: the likeliest by its place in the map, one box each, within a gate.
+
+The likelihood is that of a normal distribution (Blackman and Popoli, Design and Analysis of Modern Tracking Systems,
+1999, 6.2). By the Mahalanobis distance alone, somebody whose place is unsure takes the boxes of others.
 
 Every box has a place with a covariance. One that was not measured lies somewhere along its bearing: about as far off as
 a person of its height would be, with an error of half that distance. So a bearing alone is a long, thin covariance.
@@ -100,7 +103,7 @@ def _is_inside(a: Box, b: Box) -> bool:
 def assign(
     hypotheses: Sequence[Hypothesis], located: Sequence[Located], now: float, params: BeliefParams
 ) -> list[Hypothesis | None]:
-    """The hypothesis of each box, None for a new one; greedy by distance, each hypothesis once.
+    """The hypothesis of each box, None for a new one; greedy by likelihood, each hypothesis once.
 
     Args:
         hypotheses: that exist.
@@ -108,22 +111,23 @@ def assign(
         now: time of the picture [s], steady.
         params: gate and speed.
     """
-    pairs = sorted(
-        (mahalanobis(each, hypothesis, now, params), i, k)
-        for i, each in enumerate(located)
-        for k, hypothesis in enumerate(hypotheses)
-    )
+    pairs = []
+    for i, each in enumerate(located):
+        for k, hypothesis in enumerate(hypotheses):
+            gap, size = _distance(each, hypothesis, now, params)
+            if gap <= params.gate:
+                pairs.append((gap**2 + 2.0 * math.log(size), i, k))
     found: list[Hypothesis | None] = [None] * len(located)
     taken: set[int] = set()
-    for gap, i, k in pairs:
-        if gap <= params.gate and found[i] is None and k not in taken:
+    for _, i, k in sorted(pairs):
+        if found[i] is None and k not in taken:
             found[i] = hypotheses[k]
             taken.add(k)
     return found
 
 
-def mahalanobis(each: Located, hypothesis: Hypothesis, now: float, params: BeliefParams) -> float:
-    """Distance of a box from a hypothesis in standard deviations."""
+def _distance(each: Located, hypothesis: Hypothesis, now: float, params: BeliefParams) -> tuple[float, float]:
+    """Distance of a box from a hypothesis in standard deviations, and the size of these [m2]."""
     apart = each.place - hypothesis.place
     spread = hypothesis.spread_at(now, params) + each.spread
-    return math.sqrt(float(apart @ np.linalg.solve(spread, apart)))
+    return math.sqrt(float(apart @ np.linalg.solve(spread, apart))), math.sqrt(float(np.linalg.det(spread)))

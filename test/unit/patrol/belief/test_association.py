@@ -42,6 +42,14 @@ def test_the_gate_grows_with_time() -> None:
     assert assign([one], located, 3.0, PARAMS) == [one]
 
 
+def test_who_was_out_of_view_for_long_does_not_take_the_boxes_of_somebody_else() -> None:
+    unseen, present = somebody(0.0, 1.2), somebody(0.0, 0.0, at=19.9, number=2)
+    located = [locate(box_of(WEST, 0.0, 0.2), eye_at(WEST))]
+    assert assign([unseen, present], located, 20.0, PARAMS) == [present]
+    both = [*located, locate(box_of(WEST, 0.0, 1.1), eye_at(WEST))]
+    assert assign([unseen, present], both, 20.0, PARAMS) == [present, unseen]
+
+
 def test_nobody_walks_farther_than_the_bound() -> None:
     located = [locate(box_of(WEST, 6.0, 0.0), eye_at(WEST))]
     assert assign([somebody(0.0, 0.0)], located, 1e6, PARAMS) == [None]
