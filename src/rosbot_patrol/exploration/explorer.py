@@ -19,6 +19,7 @@ log = logging.getLogger(__name__)
 _SAME = 0.6  # frontiers closer than this are one [m]
 _NEARER = 0.15  # decrease of the distance that counts as progress [m]
 _CLOSE = 0.4  # distance from a goal that is near enough to look, if the robot comes no nearer [m]
+_STEP = 0.05  # between two places of the robot's track [m]
 _TRIES = 3  # goals that may fail before their frontier is left out
 
 
@@ -74,6 +75,7 @@ class Explorer:
         self._arrived: tuple[float, int] | None = None  # time, and the number of the map then
         self._refused: list[tuple[float, float]] = []  # goals that failed
         self._failures: list[tuple[float, float]] = []  # the frontiers of these
+        self._passed: list[tuple[float, float]] = []  # the robot's track
         self._goes_home = self._is_over = False
 
     def step(self, now: float, grid: Grid | None, maps: int, pose: Pose2D | None, link: GoalLink) -> Step:
@@ -93,6 +95,7 @@ class Explorer:
             names = " and ".join(name for name, is_missing in missing if is_missing)
             return Step(is_waiting=True, text=f"waiting for {names}")
         self._home = self._home or pose
+        self._pass(pose)
         state = link.state if self._goal is not None and link.tag == self._goal.tag else GoalState.ACTIVE
         if self._goal is None:
             return self._next(now, grid, pose)
@@ -115,6 +118,14 @@ class Explorer:
         if not any(_is_at(f, self._target) for f in found):  # it was explored on the way
             return self._next(now, grid, pose)
         return Step(text=self._about, frontiers=tuple(found))
+
+    def _pass(self, pose: Pose2D) -> None:
+        """Lengthen the robot's track."""
+        x, y = self._passed[-1] if self._passed else pose[:2]
+        count = math.floor(math.hypot(pose.x - x, pose.y - y) / _STEP)
+        shares = [k / count for k in range(1, count + 1)]
+        self._passed += [(x + share * (pose.x - x), y + share * (pose.y - y)) for share in shares]
+        self._passed = self._passed or [(x, y)]
 
     @property
     def _about(self) -> str:
@@ -146,7 +157,7 @@ class Explorer:
         return self._leave_out(now, grid, pose)
 
     def _borders(self, grid: Grid, pose: Pose2D) -> Borders:
-        return Borders(grid, pose, self.params.frontiers, self._refused)
+        return Borders(grid, pose, self.params.frontiers, self._refused, self._passed)
 
     def _leave_out(self, now: float, grid: Grid, pose: Pose2D) -> Step:
         assert self._target is not None

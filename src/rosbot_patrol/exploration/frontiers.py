@@ -71,10 +71,16 @@ class Borders:
         start: of the robot in map.
         params: limits.
         refused: places (x, y) in map that the robot did not reach: no goal is given near them.
+        passed: places (x, y) in map where the robot has been, a cell or less apart: it fits through there.
     """
 
     def __init__(
-        self, grid: Grid, start: Pose2D, params: FrontierParams, refused: Sequence[tuple[float, float]] = ()
+        self,
+        grid: Grid,
+        start: Pose2D,
+        params: FrontierParams,
+        refused: Sequence[tuple[float, float]] = (),
+        passed: Sequence[tuple[float, float]] = (),
     ) -> None:
         self._info, self._params, self._refused = grid.info, params, refused
         cells = grid.cells
@@ -82,11 +88,20 @@ class Borders:
         self._is_wall = cells >= _WALL_ABOVE
         self._unknown = ~self._free & ~self._is_wall
         self._clearance = _distances(self._is_wall, grid.info.resolution)
-        wide = self._free & (self._clearance >= params.robot_radius)
+        wide = self._free & ((self._clearance >= params.robot_radius) | self._beside(passed))
         self._ways = np.full(cells.shape, math.inf)
         cell = self._nearest(wide, start.x, start.y, 1.0)
         if cell is not None:
             self._ways = steps_over(wide, cell) * grid.info.resolution
+
+    def _beside(self, places: Sequence[tuple[float, float]]) -> Mask:
+        """Cells of some places, and those around them."""
+        mask = np.zeros(self._free.shape, np.uint8)
+        cells = [self._info.cell_of(x, y) for x, y in places]
+        for ix, iy in cells:
+            if self._info.contains_cell(ix, iy):
+                mask[iy, ix] = 1
+        return np.asarray(cv2.dilate(mask, np.ones((3, 3), np.uint8)) > 0)
 
     @property
     def area(self) -> float:

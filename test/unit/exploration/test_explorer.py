@@ -177,6 +177,27 @@ def test_a_gap_that_move_base_refuses_once_in_a_while_is_no_way(cells_wide: int,
     assert bool(found) == is_way
 
 
+def test_what_lies_behind_a_gap_that_the_robot_came_through_is_within_its_reach() -> None:
+    cells = HOUSE.cells.copy()
+    cells[70:90, 70:75] = 100
+    cells[75:83, 70:75] = 0
+    cells[95:-1, 1:30] = -1  # of the room from which it came
+    track = [(0.05 * k, 3.95) for k in range(60, 90)]
+    assert Borders(Grid(HOUSE.info, cells), Pose2D(4.5, 3.95, 0.0), FrontierParams()).frontiers() == []
+    (found,) = Borders(Grid(HOUSE.info, cells), Pose2D(4.5, 3.95, 0.0), FrontierParams(), passed=track).frontiers()
+    assert found.goal.x < 3.0
+
+
+def test_a_track_has_no_holes_however_fast_the_robot_is() -> None:
+    explorer = Explorer()
+    grid = Grid(HOUSE.info, HOUSE.cells)
+    for k in range(5):
+        explorer.step(0.1 * k, grid, k, Pose2D(2.0 + 0.33 * k, 4.0, 0.0), GoalLink(is_up=True))
+    track = np.array(explorer._passed)
+    assert track[[0, -1], 0] == pytest.approx([2.0, 3.32])
+    assert np.hypot(*np.diff(track, axis=0).T).max() < 0.06
+
+
 def test_a_robot_off_the_map_reaches_nothing() -> None:
     assert Borders(HOUSE, Pose2D(50.0, 50.0, 0.0), FrontierParams()).frontiers() == []
     assert Borders(HOUSE, Pose2D(-50.0, 2.0, 0.0), FrontierParams()).frontiers() == []
