@@ -18,6 +18,7 @@ from rosbot_patrol.errors import MapError, WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.map_io import read_map, write_map
+from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.simulation.plans.catalogue import load_catalogue
 from rosbot_patrol.simulation.plans.drawn_house import SEEDS
 from rosbot_patrol.simulation.scenario.file import read_scenario
@@ -103,6 +104,19 @@ def test_a_house_with_walls_that_a_person_looks_over(tmp_path: Path) -> None:
     starts = [actor["start"] for patrol in patrols for actor in patrol.scenario.get("actors", ()) if "start" in actor]
     assert starts
     assert all(floor.room_at(*start[:2]) > 0 for start in starts)
+
+
+def test_the_ground_before_an_open_door_is_no_floor_of_the_house(tmp_path: Path) -> None:
+    world = tmp_path / "open.world"
+    outer = [("4 0", "0.2 6.2"), ("-4 0", "0.2 6.2"), ("0 3", "8.2 0.2"), ("-2.3 -3", "3.6 0.2"), ("2.3 -3", "3.6 0.2")]
+    world.write_text(boxes(*outer, height=2.0))
+    base, hall = (
+        Room(id=0, name="base", pose=Pose2D(-3.0, 0.0, 0.0)),
+        Room(id=1, name="hall", pose=Pose2D(1.0, 0.0, 0.0)),
+    )
+    floor = Floor(load_world(world).bodies, Rooms((base, hall), "test"))
+    area = floor.regions.area(0) + floor.regions.area(1)
+    assert area == pytest.approx(7.8 * 5.8, abs=1.5)  # without the ground beside the walls
 
 
 def test_where_a_robot_starts(tmp_path: Path) -> None:
