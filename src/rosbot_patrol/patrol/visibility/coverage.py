@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import Pose2D, wrap_angles
+from rosbot_patrol.maps.raster import grown
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.floor import Array, Floor, Mask
 from rosbot_patrol.patrol.records.inputs import Eye as Eye
@@ -27,6 +28,7 @@ _FRAY = (
     0.3  # where the lidar looks farther than the map's wall, it is believed by so much: walls, poses are not exact [m]
 )
 _WIDTH = 0.02  # between two bearings of a view from the map [rad]
+_BETWEEN = np.linspace(0.0, 1.0, 16)  # shares of a line that is looked along on the map
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,6 +142,7 @@ class Coverage:
         self._left = np.arange(len(self._x))
         self._gone = np.zeros(len(self._x), bool)
         self._unmapped = floor.unmapped[self._iy, self._ix]
+        self._beside_unmapped = grown(floor.unmapped, 1)
         self._whole = len(self._x)
 
     @property
@@ -180,14 +183,17 @@ class Coverage:
         self._left = left[self._seen[left] < p.seen_in]
 
     def _strike_out(self, hidden: NDArray[np.int64], bearings: Array, sight: Sight) -> None:
-        """Leave out unmapped floor before which a wall shows that is not on the map either."""
+        """Leave out unmapped floor at whose edge, or in which, the lidar meets a wall that is not on the map."""
         unmapped = self._unmapped[hidden]
         cells, bearings = hidden[unmapped], bearings[unmapped]
         ways = sight.towards(bearings)
         seen = np.isfinite(ways)
         cells, bearings, ways = cells[seen], bearings[seen], ways[seen]
-        ix, iy, inside = self.floor.indices(sight.x + ways * np.cos(bearings), sight.y + ways * np.sin(bearings))
-        self._gone[cells[inside & self.floor.unmapped[iy, ix]]] = True
+        x, y = sight.x + ways * np.cos(bearings), sight.y + ways * np.sin(bearings)
+        ix, iy, inside = self.floor.indices(x, y)
+        on_x, on_y = (a[:, None] + (b - a)[:, None] * _BETWEEN for a, b in ((x, self._x[cells]), (y, self._y[cells])))
+        is_open = self.floor.are_free(on_x, on_y).all(axis=1)  # by the map one would look on to there
+        self._gone[cells[inside & self._beside_unmapped[iy, ix] & is_open]] = True
 
     def forget(self, before: float) -> None:
         """What was seen before a time [s] is yet to be seen."""
