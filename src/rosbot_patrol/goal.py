@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -26,6 +27,7 @@ _ENDINGS = {
     8: "the goal was called back",  # RECALLED
     9: "the goal was lost",
 }
+_NEARER = 0.15  # decrease of the distance that counts as progress [m]
 SILENCE = 5.0  # time without a status after which the server of an action counts as down [s]
 
 
@@ -64,3 +66,21 @@ class Goal:
 
     tag: str
     pose: Pose2D
+
+
+class Progress:
+    """How long a drive has brought the robot no nearer to its goal."""
+
+    def __init__(self) -> None:
+        self._best, self._since = math.inf, 0.0
+
+    def stalled(self, now: float, gap: float) -> float:
+        """Time without progress [s].
+
+        Args:
+            now: [s].
+            gap: distance from the goal [m].
+        """
+        if gap < self._best - _NEARER:
+            self._best, self._since = gap, now
+        return now - self._since

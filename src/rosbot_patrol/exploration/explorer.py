@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.exploration.frontiers import Borders, Frontier, FrontierParams
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.goal import Goal, GoalLink, GoalState
+from rosbot_patrol.goal import Goal, GoalLink, GoalState, Progress
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.params import param
 
 log = logging.getLogger(__name__)
 
 _SAME = 0.6  # frontiers closer than this are one [m]
-_NEARER = 0.15  # decrease of the distance that counts as progress [m]
 _CLOSE = 0.4  # distance from a goal that is near enough to look, if the robot comes no nearer [m]
 _STEP = 0.05  # between two places of the robot's track [m]
 _TRIES = 3  # goals that may fail before their frontier is left out
@@ -71,7 +70,7 @@ class Explorer:
         self._target: Frontier | None = None
         self._goal: Goal | None = None
         self._tags = itertools.count(1)
-        self._best, self._since, self._looked = math.inf, 0.0, -math.inf
+        self._progress, self._looked = Progress(), -math.inf
         self._arrived: tuple[float, int] | None = None  # time, and the number of the map then
         self._refused: list[tuple[float, float]] = []  # goals that failed
         self._failures: list[tuple[float, float]] = []  # the frontiers of these
@@ -194,14 +193,12 @@ class Explorer:
 
     def _send(self, now: float, pose: Pose2D) -> None:
         self._goal = Goal(tag=f"explore-{next(self._tags)}", pose=pose)
-        self._best, self._since, self._arrived = math.inf, now, None
+        self._progress, self._arrived = Progress(), None
 
     def _stalls(self, now: float, pose: Pose2D) -> bool:
         assert self._goal is not None
         gap = math.dist(pose[:2], self._goal.pose[:2])
-        if gap < self._best - _NEARER:
-            self._best, self._since = gap, now
-        return now - self._since > self.params.progress_timeout
+        return self._progress.stalled(now, gap) > self.params.progress_timeout
 
 
 def _is_at(frontier: Frontier, other: Frontier) -> bool:

@@ -28,6 +28,12 @@ class DriveParams:
     other_viewpoints: int = param(
         3, lo=0, hi=20, doc="number of other free points tried when the room's own point is unreachable, once each"
     )
+    held_after: float = param(
+        20.0,
+        unit="s",
+        lo=1.0,
+        doc="time without progress after which a robot that is in the room already looks from where it stands",
+    )
     retry_delay: float = param(2.0, unit="s", lo=0.0, doc="pause before the next attempt at a goal")
     server_wait: float = param(60.0, unit="s", lo=0.0, doc="longest total wait for move_base in one drive")
 

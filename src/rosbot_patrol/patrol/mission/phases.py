@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.goal import Goal
+from rosbot_patrol.geometry import Pose2D, distance
+from rosbot_patrol.goal import Goal, Progress
 from rosbot_patrol.patrol.belief.decision import IntruderDecision
 from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.mission.drive import DriveParams, OtherPoses, Trip, WayHome, end_of_way_home
@@ -16,6 +17,8 @@ from rosbot_patrol.patrol.records.activity import Activity, Place
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.story import status_text
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,8 @@ class DrivingTo:
     phase: ClassVar[Phase] = Phase.DRIVING
 
     def __init__(self, mission: Mission, params: DriveParams, others: OtherPoses | None) -> None:
-        self._room = mission.room
+        self._room, self._params = mission.room, params
+        self._progress = Progress()
         self._trip = Trip(f"{mission.id}/{self.phase.value}", mission.room.pose, params, others)
 
     def step(self, now: float, inputs: Inputs) -> PhaseStep:
@@ -100,15 +104,27 @@ class DrivingTo:
             reason, fault = f"{title} cannot be reached: {step.problem}", step.problem if step.is_down else ""
             outcome = Ruling(Verdict.UNREACHABLE, reason, fault)
         why = f"driving to {title}{'' if self._trip.is_at_first else ', to another viewpoint in it'}"
+        if outcome is None and self._is_held_in_room(now, inputs):
+            log.info("%s: something holds the robot up in it, which looks from where it stands", title)
+            return PhaseStep(status=self.phase, why=why, cancel=True, outcome=Arrived())
         return PhaseStep(status=self.phase, why=why, goal=step.goal, cancel=step.cancel, outcome=outcome)
+
+    def _is_held_in_room(self, now: float, inputs: Inputs) -> bool:
+        if inputs.pose is None or inputs.house is None:
+            return False
+        stalled = self._progress.stalled(now, distance(inputs.pose, self._room.pose))
+        is_inside = inputs.house.room_at(inputs.pose.x, inputs.pose.y) == self._room.id
+        return is_inside and stalled > self._params.held_after
 
     def pause(self) -> bool:
         """Interrupt the drive."""
         self._trip.pause()
+        self._progress = Progress()
         return True
 
     def hold(self, now: float, inputs: Inputs) -> None:
-        """Nothing to measure."""
+        """A drive that others interrupt is not held up."""
+        self._progress = Progress()
 
 
 class LookingAround:
