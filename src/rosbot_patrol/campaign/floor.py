@@ -29,7 +29,7 @@ from rosbot_patrol.simulation.scene.ways import EYE_LEVEL, Ways
 Mask = NDArray[np.bool_]
 
 CELL = 0.1
-_MARGIN = 3  # around what stands in the world [cells]; outdoors, where a door leads there: no floor of a room
+_MARGIN = 0.3  # around what stands in the world [m]; outdoors, where a door leads there: no floor of a room
 PERSON_RADIUS, ROBOT_RADIUS = 0.30, 0.24  # distance that each keeps from furniture [m]
 BODY_RADIUS = 0.25  # of a person [m]
 PERSON_HEIGHTS = (0.16, 0.45, 0.75, EYE_LEVEL)  # heights at which a person collides with furniture [m]
@@ -64,8 +64,8 @@ class Floor:
         self._sight = Sight(bodies)
         heights = sorted({*PERSON_HEIGHTS, *ROBOT_HEIGHTS})
         free = {h: floor_plan(bodies, self.info, height=h, start=start).cells == 0 for h in heights}
-        inside = np.zeros(self.info.shape, bool)
-        inside[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN] = True
+        inside, edge = np.zeros(self.info.shape, bool), round(_MARGIN / CELL)
+        inside[edge:-edge, edge:-edge] = True
         self.open: Mask = np.logical_and.reduce([inside, *(free[h] for h in ROBOT_HEIGHTS)])
         self.standable = shrunk(np.logical_and.reduce([inside, *(free[h] for h in PERSON_HEIGHTS)]), PERSON_RADIUS)
         drivable = shrunk(self.open, ROBOT_RADIUS)
@@ -232,7 +232,7 @@ def floor_info(bodies: Sequence[Body], source: str | Path = "the world") -> Grid
     ends = np.vstack([slice_bodies(bodies, height).segments.reshape(-1, 2) for height in (EYE, EYE_LEVEL)])
     if not len(ends):
         raise WorldError(source, f"has no walls: nothing in it is {EYE:g} m high, so there are no rooms to guard")
-    low, high = ends.min(axis=0) - _MARGIN * CELL, ends.max(axis=0) + _MARGIN * CELL
+    low, high = ends.min(axis=0) - _MARGIN, ends.max(axis=0) + _MARGIN
     width, height = (math.ceil(v / CELL) for v in high - low)
     return GridInfo(resolution=CELL, width=width, height=height, origin_x=float(low[0]), origin_y=float(low[1]))
 

@@ -1,6 +1,6 @@
 """The belief of who is in the house: every picture and every scan updates each hypothesis in view.
 
-A box belongs to the nearest hypothesis within its gate, or begins one. A hypothesis that was in view and has no box
+A box belongs to the likeliest hypothesis within its gate, or begins one. A hypothesis that was in view and has no box
 takes the lack of it as evidence, as far as its place was surely in view. Verdict: a posterior of at least
 `confirmed_above`, with two boxes and no veto, confirms. All posteriors below `clear_below`, with the floor seen, are
 clear. Anything else is unverified, with the place.
