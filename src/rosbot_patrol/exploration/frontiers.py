@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
+from rosbot_patrol.maps.raster import grown
 from rosbot_patrol.maps.ways import steps_over
 from rosbot_patrol.params import param
 
@@ -96,12 +97,12 @@ class Borders:
 
     def _beside(self, places: Sequence[tuple[float, float]]) -> Mask:
         """Cells of some places, and those around them."""
-        mask = np.zeros(self._free.shape, np.uint8)
-        cells = [self._info.cell_of(x, y) for x, y in places]
-        for ix, iy in cells:
+        mask = np.zeros(self._free.shape, bool)
+        for x, y in places:
+            ix, iy = self._info.cell_of(x, y)
             if self._info.contains_cell(ix, iy):
-                mask[iy, ix] = 1
-        return np.asarray(cv2.dilate(mask, np.ones((3, 3), np.uint8)) > 0)
+                mask[iy, ix] = True
+        return grown(mask, 1)
 
     @property
     def area(self) -> float:

@@ -66,7 +66,7 @@ def suggest_rooms(floor: Floor, start: Pose2D) -> Rooms:
 
 
 def _points(floor: Floor, shares: list[NDArray[np.bool_]], start: Pose2D) -> list[tuple[float, float, float]]:
-    """Number of cells and point of each share, without those whose point lies beside the base."""
+    """Number of cells and point of each share; shares with a point beside the base are left out."""
     points = [(float(share.sum()), *point_of(floor, share)) for share in shares]
     return [point for point in points if math.dist(point[1:], start[:2]) >= _APART]
 

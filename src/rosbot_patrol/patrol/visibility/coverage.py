@@ -183,7 +183,7 @@ class Coverage:
         self._left = left[self._seen[left] < p.seen_in]
 
     def _strike_out(self, hidden: NDArray[np.int64], bearings: Array, sight: Sight) -> None:
-        """Leave out unmapped floor at whose edge, or in which, the lidar meets a wall that is not on the map."""
+        """Leave out unmapped floor behind a wall that the lidar meets there and the map does not show."""
         unmapped = self._unmapped[hidden]
         cells, bearings = hidden[unmapped], bearings[unmapped]
         ways = sight.towards(bearings)
