@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Accuracy of a person's place on the map, and rejections: people, pets and posters in the houses.
 
-    python3 benchmarks/person_place.py [--number N] [--json FILE]
+    python3 benchmarks/person_place.py [--number N] [--network NAME --figures detailed] [--json FILE]
 
 The robot is put at random places. A person, a pet or a poster 1 to 6.5 m away is photographed once, with depth and
-scan, through the simulator's camera and the shipped network, without ROS. Places are measured with depth and without
+scan, through the simulator's camera and a network, without ROS. Places are measured with depth and without
 (lidar, else the floor). The pose in the map is the true one, so amcl's error is not included.
 """
 
@@ -20,9 +20,10 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from places import CLASSES, LOOKS, draw_places, make_engine
+from places import LOOKS, draw_places, make_engine
 
-from rosbot_patrol.detection.detector import load_detector
+from rosbot_patrol.detection.choice import open_network
+from rosbot_patrol.detection.detector import Detector
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.images.encodings import Picture
@@ -42,14 +43,14 @@ KINDS = ("person", "dog", "cat", "poster")
 
 
 class Stage:
-    """One house with its robot, map and network."""
+    """One house with its robot, its map and a network."""
 
-    def __init__(self, house: str) -> None:
-        self.engine = make_engine(load_world(ROOT / "worlds" / f"{house}.world"))
+    def __init__(self, house: str, detector: Detector, figures: str) -> None:
+        self.engine = make_engine(load_world(ROOT / "worlds" / f"{house}.world"), figures)
         self.floor = floor_of(read_map(ROOT / "maps" / f"{HOUSES[house]}_map.yaml"))
         k = self.engine.params.camera.intrinsics
         self.lens = Lens(fx=k.fx, fy=k.fy, cx=k.cx, cy=k.cy, width=k.width, height=k.height)
-        self.detector = load_detector(ROOT / "models" / "house.cfg", ROOT / "models" / "house.weights", list(CLASSES))
+        self.detector = detector
 
     def view(self) -> View:
         """The camera's present viewpoint."""
@@ -100,13 +101,16 @@ def put(stage: Stage, kind: str, place: Pose2D, rng: np.random.Generator) -> Pos
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--number", type=int, default=20, help="of places in each house for each kind")
+    parser.add_argument("--network", default="house", help="that finds people, as network:= takes it")
+    parser.add_argument("--figures", choices=("plain", "detailed"), default="plain", help="of people")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     rng = np.random.default_rng(4)
+    detector = open_network(arguments.network).detector
     errors: dict[str, list[float]] = {"depth": [], "lidar": [], "floor": []}
     told: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     for house in HOUSES:
-        stage = Stage(house)
+        stage = Stage(house, detector, arguments.figures)
         for kind in KINDS:
             for place in draw_places(stage.engine, rng, arguments.number):
                 there = put(stage, kind, place, rng)

@@ -19,7 +19,6 @@ from rosbot_patrol.simulation.robot.description import load_robot
 from rosbot_patrol.simulation.sdf.world import World
 
 ROOT = Path(__file__).resolve().parent.parent
-CLASSES = ("person", "fire hydrant")
 LOOKS = ("intruder_test_balaclava", "intruder_test_violet", "intruder_test_orchid")
 
 
