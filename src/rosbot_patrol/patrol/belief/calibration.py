@@ -61,7 +61,7 @@ class Calibration:
         sha256: of cfg and weights, "" for the cautious one.
         rho_person, rho_nobody: correlation of two pictures from one side, between 0 and 1.
         person, nobody: probability of each outcome, shape SHAPE; the last axis sums to 1.
-        fooled: probability that a pet fools it, from however many places it looks.
+        fooled: probability that a pet fools it, from each side anew.
     """
 
     network: str

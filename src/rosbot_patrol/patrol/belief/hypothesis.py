@@ -199,9 +199,9 @@ class Hypothesis:
         return sum(side.near for side in self.sides) + self.moved
 
     @property
-    def whole(self) -> float:
-        """Log-likelihood ratio of views of the whole."""
-        return sum(side.whole for side in self.sides)
+    def wholes(self) -> Array:
+        """Log-likelihood ratio of views of the whole from each side, shape (S,)."""
+        return np.array([side.whole for side in self.sides])
 
     @property
     def probability(self) -> float:
@@ -215,8 +215,8 @@ class Hypothesis:
         return sum((side.size(params) for side in self.sides), np.zeros(2))
 
     def posterior(self, params: BeliefParams, fooled: float) -> float:
-        """Probability of a person there, by a network that this share of pets fools."""
-        return posterior(self.near, self.whole, self.size(params), params, fooled)
+        """Probability of a person there, by a network that a pet fools from this share of sides."""
+        return posterior(self.near, self.wholes, self.size(params), params, fooled)
 
     def find_side(self, eye: Pose2D, params: BeliefParams) -> Side | None:
         """The known side that a camera sees, None if it is another one.
@@ -320,24 +320,25 @@ def _said(side: Side, away: float) -> str:
     return f"{boxes:.0f} boxes and {silent:.0f} pictures without one from {away:.1f} m ({side.score:+.1f})"
 
 
-def posterior(near: float, whole: float, size: Array, params: BeliefParams, fooled: float) -> float:
+def posterior(near: float, wholes: Array, size: Array, params: BeliefParams, fooled: float) -> float:
     """Probability of a person, against a look-alike and nobody.
 
-    A picture of a person is one for any network. A pet, seen whole, fools the network or does not.
+    A picture of a person is one for any network, from all sides. A pet, seen whole, fools the network from one side and
+    not from the next.
 
     Args:
         near: log-likelihood ratio of views from near and of motion, of a person or look-alike against nobody.
-        whole: log-likelihood ratio of views of the whole, of a person against nobody.
+        wholes: log-likelihood ratio of views of the whole from each side, of a person against nobody, shape (S,).
         size: log-likelihood ratios of size and depth, of a person against a pet and against a picture, shape (2,).
         params: prior of each.
-        fooled: probability that a pet fools the network.
+        fooled: probability that a pet fools the network from one side.
     """
-    by_pet, by_picture = near - float(size[0]), near - float(size[1])
+    whole = float(wholes.sum())
+    as_pet = float(np.logaddexp(math.log(fooled) + wholes, math.log(1.0 - fooled)).sum())
     logs = (
         math.log(params.prior) + near + whole,
-        math.log(params.pets * fooled) + by_pet + whole,
-        math.log(params.pets * (1.0 - fooled)) + by_pet,
-        math.log(params.pictures) + by_picture + whole,
+        math.log(params.pets) + near - float(size[0]) + as_pet,
+        math.log(params.pictures) + near - float(size[1]) + whole,
         math.log(1.0 - params.prior - params.pets - params.pictures),
     )
     most = max(logs)

@@ -70,13 +70,20 @@ def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_o
             imagined.add(Evidence(int(k), person, nobody, is_near=is_near), calibration)
         then = posterior(
             hypothesis.near + imagined.near,
-            hypothesis.whole + imagined.whole,
+            _wholes(hypothesis, side, imagined),
             size + more if k else size,
             p,
             calibration.fooled,
         )
         after += (now * one + (1.0 - now) * none) * entropy(then)
     return entropy(now) - after
+
+
+def _wholes(hypothesis: Hypothesis, side: Side, imagined: Side) -> Array:
+    """What each side says of the whole after a look from one of them, or from a new one, shape (S,)."""
+    known = [each.whole + imagined.whole if each is side else each.whole for each in hypothesis.sides]
+    is_new = not any(each is side for each in hypothesis.sides)
+    return np.array([*known, imagined.whole] if is_new else known)
 
 
 def _size_of_another_side(hypothesis: Hypothesis, params: BeliefParams) -> Array:
