@@ -14,6 +14,7 @@ import math
 import multiprocessing
 import os
 import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.simulation.actors.looks import Look
 from rosbot_patrol.simulation.actors.people import person_body, person_pose_parts
 from rosbot_patrol.simulation.render.egl import EglRenderer
@@ -274,7 +276,7 @@ def _poster(painter: EglRenderer, look: Look, rng: np.random.Generator) -> Textu
 
 
 @dataclass(frozen=True)
-class _Job:
+class Job:
     """A shard to be drawn.
 
     Attributes:
@@ -284,6 +286,7 @@ class _Job:
         test: whether it is for tests.
         told: what `Studio.shard` is told.
         detailed: share of people with detailed figures.
+        count: of pictures.
     """
 
     target: Path
@@ -292,16 +295,18 @@ class _Job:
     test: bool
     told: dict[str, Any]
     detailed: float
+    count: int = PER_SHARD
 
 
-def _work(job: _Job) -> str:
+def draw(job: Job) -> str:
+    """Draw a shard unless it is there; returns its file's name."""
     if job.target.exists():
         return job.target.name
     if os.nice(0) < 5:
         os.nice(5)
     cv2.setNumThreads(1)
     studio = studio_of(job.house, unseen=job.test, detailed=job.detailed)
-    write_shard(job.target, *studio.shard([*job.seed], PER_SHARD, test=job.test, **job.told))
+    write_shard(job.target, *studio.shard([*job.seed], job.count, test=job.test, **job.told))
     return job.target.name
 
 
@@ -324,17 +329,17 @@ def write_shard(target: Path, pictures: NDArray[Any], boxes: NDArray[Any], masks
 
 def _jobs(
     options: argparse.Namespace, name: str, pictures: float, seed: int, house: Path | None, **told: Any
-) -> list[_Job]:
+) -> list[Job]:
     """The shards of a set."""
     test = options.set is not None
     targets = [
         options.folder / f"{name}-{k:04d}{JPEGS if options.jpeg else '.npy'}"
         for k in range(math.ceil(pictures / PER_SHARD))
     ]
-    return [_Job(target, (seed, k, int(test)), house, test, told, options.detailed) for k, target in enumerate(targets)]
+    return [Job(target, (seed, k, int(test)), house, test, told, options.detailed) for k, target in enumerate(targets)]
 
 
-def _jobs_of_kinds(options: argparse.Namespace) -> list[_Job]:
+def _jobs_of_kinds(options: argparse.Namespace) -> list[Job]:
     """The shards of all kinds of training pictures."""
     jobs = []
     for kind in KINDS:
@@ -343,7 +348,7 @@ def _jobs_of_kinds(options: argparse.Namespace) -> list[_Job]:
     return jobs
 
 
-def _jobs_asked_for(options: argparse.Namespace) -> list[_Job]:
+def _jobs_asked_for(options: argparse.Namespace) -> list[Job]:
     if options.kinds:
         return _jobs_of_kinds(options)
     if options.set is not None:
@@ -374,14 +379,28 @@ def main() -> None:
     which.add_argument("--kinds", action="store_true", help="draw all kinds of kinds.py; --pictures: of the commonest")
     parser.add_argument("--worlds", type=Path, default=Path("worlds"), help="where the houses of --kinds are")
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="draw on the workers of this dask scheduler (afar.py)")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     jobs = _jobs_asked_for(options)
-    with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
-        for done, name in enumerate(pool.imap_unordered(_work, jobs), 1):
+    try:
+        for done, name in enumerate(_drawn(jobs, options), 1):
             sys.stdout.write(f"\r{done}/{len(jobs)} shards ({name}) ")
             sys.stdout.flush()
+    except PatrolError as err:
+        sys.exit(f"\n{err}")
     sys.stdout.write("\n")
+
+
+def _drawn(jobs: Sequence[Job], options: argparse.Namespace) -> Iterator[str]:
+    """The names of the shards, as they are done."""
+    if options.scheduler:
+        from training.pictures.afar import draw_afar
+
+        yield from draw_afar(options.scheduler, jobs)
+        return
+    with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
+        yield from pool.imap_unordered(draw, jobs)
 
 
 if __name__ == "__main__":

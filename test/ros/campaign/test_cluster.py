@@ -5,20 +5,18 @@ from __future__ import annotations
 import json
 import os
 import signal
-import socket
 import subprocess
-import sys
 import threading
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from dask_machines import Machines, connected
 
 pytest.importorskip("rosbot_patrol.msg", reason="the workspace is not on the path: `. scripts/env`")
 pytest.importorskip("distributed", reason="dask.distributed is not installed: sudo apt-get install python3-distributed")
 
-from rosbot_patrol.ros.campaign.cluster import PROGRAM, Cluster, ClusterError, pack, sources_digest, unpack
+from rosbot_patrol.ros.campaign.cluster import Cluster, ClusterError, pack, unpack
+from rosbot_patrol.ros.campaign.far_patrols import PROGRAM, patrols_of, sources_digest
 
 ROOT = Path(__file__).parents[3]
 WORDS = ["--timeout", "30"]
@@ -30,51 +28,13 @@ plan = json.loads((folder / "patrol.json").read_text())
 time.sleep(plan["lasts"])
 (folder / "result.json").write_text(json.dumps({"number": plan["number"], "worker": os.environ["WORKER"]}))
 """
-WORK = "import sys; from rosbot_patrol.ros.campaign.cluster import work; work(sys.argv[1], 1)"
+WORK = "import sys; from rosbot_patrol.ros.campaign.far_patrols import work; work(sys.argv[1], 1)"
 
 
-class Machines:
-    """A scheduler and its workers, as processes of their own."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        (folder / "play.py").write_text(PLAY)
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
-        self.processes: list[subprocess.Popen[bytes]] = []
-
-    def schedule(self) -> None:
-        port = self.address.rpartition(":")[2]
-        module = "distributed.cli.dask_scheduler"
-        self.start(
-            [sys.executable, "-W", "ignore", "-m", module, "--host", "127.0.0.1", "--port", port, "--no-dashboard"]
-        )
-
-    def work(self, name: str) -> subprocess.Popen[bytes]:
-        changes = {PROGRAM: str(self.folder / "play.py"), "WORKER": name}
-        return self.start([sys.executable, "-W", "ignore", "-c", WORK, self.address], changes)
-
-    def start(self, command: list[str], changes: dict[str, str] | None = None) -> subprocess.Popen[bytes]:
-        with (self.folder / "log").open("ab") as log:
-            env = {**os.environ, **(changes or {})}
-            self.processes.append(
-                subprocess.Popen(command, env=env, stdout=log, stderr=log, cwd=self.folder, start_new_session=True)
-            )
-        return self.processes[-1]
-
-    def close(self) -> None:
-        for process in self.processes:
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait(10.0)
-
-
-@pytest.fixture
-def machines(tmp_path: Path) -> Iterator[Machines]:
-    found = Machines(tmp_path)
-    yield found
-    found.close()
+def start_worker(machines: Machines, name: str) -> subprocess.Popen[bytes]:
+    play = machines.folder / "play.py"
+    play.write_text(PLAY)
+    return machines.start(["-W", "ignore", "-c", WORK, machines.address], {PROGRAM: str(play), "WORKER": name})
 
 
 def patrols(folder: Path, count: int, lasts: float) -> list[tuple[str, bytes]]:
@@ -87,30 +47,19 @@ def patrols(folder: Path, count: int, lasts: float) -> list[tuple[str, bytes]]:
     return found
 
 
-def connected(machines: Machines, root: Path = ROOT) -> Cluster:
-    deadline = time.monotonic() + 30.0
-    while True:
-        try:
-            return Cluster(machines.address, root, WORDS)
-        except ClusterError:
-            assert time.monotonic() < deadline
-
-
 def test_a_killed_worker_s_patrol_is_played_by_another(machines: Machines, tmp_path: Path) -> None:
     machines.schedule()
-    first = machines.work("first")
-    machines.work("second")
-    cluster = connected(machines)
+    first = start_worker(machines, "first")
+    start_worker(machines, "second")
+    cluster = connected(lambda: Cluster(machines.address, patrols_of(ROOT, WORDS)))
     results: dict[str, str] = {}
 
-    def done(name: str, problem: str, data: bytes) -> None:
+    for name, problem, data in cluster.results(patrols(tmp_path, 6, 0.5)):
         assert problem == ""
         unpack(data, tmp_path / "back")
         results[name] = json.loads((tmp_path / "back" / name / "result.json").read_text())["worker"]
         if "first" in results.values() and first.poll() is None:
             os.killpg(first.pid, signal.SIGKILL)
-
-    cluster.run(patrols(tmp_path, 6, 0.5), done)
     cluster.close()
     assert sorted(results) == [f"{n:04d}" for n in range(6)]
     assert set(results.values()) == {"first", "second"}
@@ -120,13 +69,15 @@ def test_a_worker_with_other_sources_is_sent_away_and_a_scheduler_that_goes_is_t
     machines: Machines, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     machines.schedule()
-    worker = machines.work("other")
-    cluster = connected(machines, tmp_path)  # a folder without our launch files is another commit
+    worker = start_worker(machines, "other")
+    cluster = connected(
+        lambda: Cluster(machines.address, patrols_of(tmp_path, WORDS))
+    )  # a folder without our launch files is another commit
     problems: list[BaseException] = []
 
     def run() -> None:
         try:
-            cluster.run(patrols(tmp_path, 1, 0.1), lambda *_: None)
+            list(cluster.results(patrols(tmp_path, 1, 0.1)))
         except ClusterError as err:
             problems.append(err)
 
@@ -143,7 +94,7 @@ def test_a_worker_with_other_sources_is_sent_away_and_a_scheduler_that_goes_is_t
 
 def test_nobody_there_is_a_sentence(machines: Machines) -> None:
     with pytest.raises(ClusterError, match=r"the scheduler tcp://127\.0\.0\.1:\d+ does not answer"):
-        Cluster(machines.address, ROOT, WORDS, patience=1.0)
+        Cluster(machines.address, patrols_of(ROOT, WORDS), patience=1.0)
 
 
 def test_the_digest_covers_sources_and_launch_files(tmp_path: Path) -> None:

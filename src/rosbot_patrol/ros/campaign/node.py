@@ -41,9 +41,10 @@ from rosbot_patrol.detection.choice import open_network
 from rosbot_patrol.errors import PatrolError, WorldError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.ros.campaign.cluster import Cluster, pack, unpack, work
+from rosbot_patrol.ros.campaign.cluster import Cluster, pack, unpack
 from rosbot_patrol.ros.campaign.crash import CrashLife
 from rosbot_patrol.ros.campaign.crashes import CrashCampaign
+from rosbot_patrol.ros.campaign.far_patrols import patrols_of, work
 from rosbot_patrol.ros.campaign.house import HouseError
 from rosbot_patrol.ros.campaign.houses import FOLDER as HOUSE_FOLDER
 from rosbot_patrol.ros.campaign.houses import Houses, explore, prepare_world
@@ -156,7 +157,7 @@ class Campaign:
 
     def _run_elsewhere(self, address: str, wanted: list[int]) -> None:
         """Play patrols on the workers of a scheduler. Raises ClusterError."""
-        cluster = Cluster(address, self._root, self._words())
+        cluster = Cluster(address, patrols_of(self._root, self._words()))
         base = self._folder.folder
 
         def packed(number: int) -> tuple[str, bytes]:
@@ -164,13 +165,11 @@ class Campaign:
             house = base / HOUSE_FOLDER / self._houses.name_of(number)
             return folder.name, pack(base, [folder, *([house] if house.is_dir() else [])])
 
-        def take(name: str, problem: str, data: bytes) -> None:
-            if data:
-                unpack(data, base)
-            self._done(Job(name, (), base / name / "campaign.log", 0.0), problem)
-
         try:
-            cluster.run(map(packed, wanted), take)
+            for name, problem, data in cluster.results(map(packed, wanted)):
+                if data:
+                    unpack(data, base)
+                self._done(Job(name, (), base / name / "campaign.log", 0.0), problem)
         finally:
             cluster.close()
 
