@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import io
+import logging
 import time
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
@@ -90,6 +91,7 @@ def serve(address: str, jobs: int, what: str) -> None:
         ClusterError: it does not answer.
     """
     worker_class = _distributed().Worker
+    logging.getLogger("distributed").setLevel(logging.ERROR)  # it tells of every connection
 
     async def run() -> None:
         async with worker_class(address, nthreads=jobs, memory_limit=0, death_timeout=_GONE) as worker:
