@@ -133,7 +133,7 @@ class IntruderDecision:
             shown = self.belief.see(now, frame, PictureView(self._sight(inputs, frame.eye), frame.is_dark))
             if shown:
                 self.pictures = self.belief.pictures(_PICTURES)
-            findings += [self._find(now, each, inputs.house, frame.eye) for each in shown if each.is_confirmed]
+            findings += [self._find(now, each, inputs, frame.eye) for each in shown if each.is_confirmed]
             somebody = [each for each in shown if each.last in frame.boxes and self.belief.may_be_somebody(each)]
             is_early = not frame.counts and bool(self.belief.plausible(frame))  # it cannot be judged yet
             self._showing.append((now, bool(somebody) or is_early))
@@ -154,12 +154,13 @@ class IntruderDecision:
         """Persons who were confirmed."""
         return self._persons.met
 
-    def _find(self, now: float, hypothesis: Hypothesis, house: RoomRegions | None, eye: Eye | None) -> Finding:
+    def _find(self, now: float, hypothesis: Hypothesis, inputs: Inputs, eye: Eye | None) -> Finding:
         seen = _confirmation(hypothesis, self.belief.posterior(hypothesis))
         key = hypothesis.number if hypothesis.is_placed else None
         pose = None if eye is None else eye.pose
-        person, is_new = self._persons.note(now, seen.measured, key, hypothesis.others, eye=pose)
-        room, is_outside = self._room_at(person, house)
+        stays = inputs.scan is not None and not hypothesis.moved
+        person, is_new = self._persons.note(now, seen.measured, key, hypothesis.others, eye=pose, stays=stays)
+        room, is_outside = self._room_at(person, inputs.house)
         person.label, person.room = seen.label, room.title if room else ""
         return Finding(
             seen=seen,

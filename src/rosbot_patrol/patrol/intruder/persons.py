@@ -1,8 +1,9 @@
 """Who was met on a mission: the same person once, another one as another.
 
-Somebody who is seen again near where they were last seen, or as far off as they can have walked, is the same. So is
-somebody in the same direction: their distance may have been measured wrongly. Two people whom pictures showed
-side by side are never merged. Somebody without a known place counts as the one seen last.
+Somebody who is seen again near where they were last seen, or as far off as they can have walked, is the same. Of two
+whom the lidar has not seen move, neither has walked. Somebody in the same direction is the same, too: their distance
+may have been measured wrongly. Two people whom pictures showed side by side are never merged. Somebody without a known
+place counts as the one seen last.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ class Persons:
         apart: Collection[int] = (),
         *,
         eye: Pose2D | None = None,
+        stays: bool = False,
     ) -> tuple[Person, bool]:
         """Somebody was confirmed; who it is, and whether for the first time.
 
@@ -68,9 +70,11 @@ class Persons:
             key: sightings with the same key are known to be of the same person.
             apart: keys of those who are known to be others.
             eye: the camera in map, None if unknown.
+            stays: the lidar, which sees, has not seen them move.
         """
         person = self._by_key.get(key) if key is not None else None
-        person = person or self._who(now, measured, [self._by_key[k] for k in apart if k in self._by_key], eye)
+        others = [self._by_key[k] for k in apart if k in self._by_key]
+        person = person or self._who(now, measured, others, eye, stays=stays)
         is_new = person is None
         if person is None:
             person = Person(number=len(self.met) + 1, x=None, y=None, error=math.inf, at=now)
@@ -79,25 +83,29 @@ class Persons:
             self._by_key[key] = person
         if measured is not None and (measured.error <= 2.0 * person.error or now - person.at > 1.0):
             person.x, person.y, person.error = measured.x, measured.y, measured.error
-        person.at = now
+        person.at, person.stays = now, stays
         person.sightings += 1
         return person, is_new
 
     def _who(
-        self, now: float, measured: Measured | None, others: Sequence[Person], eye: Pose2D | None
+        self, now: float, measured: Measured | None, others: Sequence[Person], eye: Pose2D | None, *, stays: bool
     ) -> Person | None:
         left = [person for person in self.met if not any(person is other for other in others)]
         if measured is None:
             return max(left, key=lambda person: person.at, default=None)
-        may_be = [p for p in left if self._gap(now, p, measured) <= 0.0 or _is_in_line(eye, p, measured)]
+        may_be = [
+            p
+            for p in left
+            if self._gap(now, p, measured, may_walk=not (stays and p.stays)) <= 0.0 or _is_in_line(eye, p, measured)
+        ]
         return min(may_be, key=lambda person: _apart(person, measured), default=None)
 
-    def _gap(self, now: float, person: Person, measured: Measured) -> float:
+    def _gap(self, now: float, person: Person, measured: Measured, *, may_walk: bool) -> float:
         """How much farther apart than one can have walked [m], 0 or less where it may be the same."""
         p = self.params
         if person.x is None or person.y is None:
             return 0.0
-        walked = min(p.walking_speed * (now - person.at), p.walked_most)
+        walked = min(p.walking_speed * (now - person.at), p.walked_most) if may_walk else 0.0
         return _apart(person, measured) - p.same_person - walked - min(measured.error, 1.0) - min(person.error, 1.0)
 
 

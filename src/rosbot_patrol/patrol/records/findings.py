@@ -36,6 +36,7 @@ class Person:
         number: from 1 on.
         x: last place in map [m]; y: likewise; error: of it [m]; at: when [s].
         sightings: number of confirmations; label: object class; room: its name, for people.
+        stays: the lidar, which sees, has not seen them move.
     """
 
     number: int
@@ -46,3 +47,4 @@ class Person:
     sightings: int = 0
     label: str = ""
     room: str = ""
+    stays: bool = False

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pytest
+
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.persons import Persons
 from rosbot_patrol.patrol.records.inputs import Measured
@@ -28,6 +30,14 @@ def test_one_who_walked_on_is_the_same() -> None:
     people = Persons()
     people.note(0.0, at(0.0))
     assert people.note(4.0, at(4.0)) == (people.met[0], False)
+
+
+@pytest.mark.parametrize(("first", "second"), [(True, True), (True, False), (False, True)])
+def test_of_two_whom_the_lidar_has_not_seen_move_neither_has_walked(first: bool, second: bool) -> None:
+    people = Persons()
+    people.note(0.0, at(0.0), key=1, stays=first)
+    assert people.note(20.0, at(4.0), key=2, stays=second)[1] == (first and second)
+    assert not people.note(20.1, at(4.4), key=3, stays=second)[1]
 
 
 def test_one_whom_nobody_can_have_walked_to_is_another() -> None:
