@@ -70,7 +70,7 @@ def _draw(data: bytes, name: str, digest: str) -> tuple[str, bytes]:
 
 
 def _keep(data: bytes, target: Path) -> None:
-    """Put the files of a shard into its folder: the one by whose name it is known comes last."""
+    """Put the files of a shard into its folder: the pictures last, as a shard with pictures counts as drawn."""
     with tempfile.TemporaryDirectory(prefix="part-", dir=target.parent) as temporary:
         folder = Path(temporary)
         unpack(data, folder)

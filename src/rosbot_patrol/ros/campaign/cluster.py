@@ -39,7 +39,7 @@ class Task:
         work: does a piece on a worker. It takes the piece's data, its name, and `digest`; it returns a problem, "" for
             none, and the result; no result if the worker has other sources.
         digest: of the sources here.
-        find_digest: finds that of a worker.
+        find_digest: called on a worker, gives the digest of its sources.
         start: command that starts a worker.
     """
 
