@@ -38,7 +38,9 @@ class Result:
         home: whether it came back; None if it went on to another room, or unknown.
         suspects: objects that the guard reports as person-like.
         mishap: the fault, "" for none; allowed: verdicts that it excuses.
-        people: persons to be found; mails: delivered mails of the mission to the room; missions: number that ended.
+        people: persons to be found; shown: number of them that the camera had in view for long enough before the
+            look-around was over, 0 for unknown.
+        mails: delivered mails of the mission to the room; missions: number that ended.
         sim_s, wall_s: duration.
     """
 
@@ -72,6 +74,7 @@ class Result:
     mishap: str = ""
     allowed: tuple[str, ...] = ()
     people: int = 1
+    shown: int = 0
     mails: int = 0
     missions: int = 0
     sim_s: float = 0.0
@@ -99,8 +102,9 @@ class Result:
 
     @property
     def has_its_mails(self) -> bool:
-        """Whether there was one mail, or one for each of several people."""
-        return 1 <= self.mails <= max(self.people, 1)
+        """Whether each person whom the camera could see, unless it broke, made a mail, and none made two."""
+        fewest = 1 if self.mishap else max(self.shown, 1)
+        return fewest <= self.mails <= max(self.people, 1)
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -113,7 +117,8 @@ class Result:
         if not (self.missed or self.false_alarm or self.problem) and not self.was_there and not is_right:
             found.append(f"{self.verdict or 'no verdict'} in a room without anybody")
         if self.verdict == CONFIRMED and not self.has_its_mails:
-            found.append(count_of(self.mails, "mail"))
+            in_view = f" for {self.shown} people in view" if self.mails < self.shown else ""
+            found.append(count_of(self.mails, "mail") + in_view)
         touched = self.touches or sorted(set(self.contacts))
         found += [f"touched {'; '.join(touched)}"] if self.contacts else []
         found += ["not home"] if self.home is False else []

@@ -51,7 +51,7 @@ def shares(results: Sequence[Result]) -> list[Share]:
         Share("home again", sum(r.home is True for r in played), sum(r.home is not None for r in played)),
         Share("without touching anything", sum(not r.contacts for r in played), len(played)),
         Share(
-            "one mail for each confirmed",
+            "one mail a person, where confirmed",
             sum(r.has_its_mails for r in played if r.verdict == CONFIRMED),
             sum(r.verdict == CONFIRMED for r in played),
         ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.campaign.cast import Person
@@ -89,24 +89,46 @@ def presence(
     in_view: set[float] = set()
     steps: dict[float, float] = {}
     for person in people:
-        track = tracks.get(person.name)
-        if track is None:
-            continue
-        for i, (time, pose) in enumerate(zip(track.times, track.poses, strict=True)):
-            if not begin <= time <= end:
-                continue
-            after = track.times[i + 1] if i + 1 < len(track.times) else time
-            steps[time] = min(after - time, _LONGEST)
+        for time, step, pose in _between(tracks.get(person.name), begin, end):
+            steps[time] = step
             if floor.room_at(pose.x, pose.y) == room:
                 in_room.add(time)
-            at = robot.at(time)
-            if at is not None and floor.in_view(at, pose, person.posture) >= RECOGNISED:
+            if _is_in_view(floor, person, pose, robot.at(time)):
                 in_view.add(time)
     return Presence(
         in_room=round(sum(steps[t] for t in in_room), 2),
         in_view=round(sum(steps[t] for t in in_view), 2),
         first_view=min(in_view, default=None),
     )
+
+
+def shown(
+    floor: Floor, people: Sequence[Person], tracks: dict[str, Track], robot: Track, *, begin: float, end: float
+) -> int:
+    """Number of people who were each in the camera's view for long enough to be found, from `begin` to `end` [s]."""
+    spans = [
+        sum(
+            step
+            for time, step, pose in _between(tracks.get(person.name), begin, end)
+            if _is_in_view(floor, person, pose, robot.at(time))
+        )
+        for person in people
+    ]
+    return sum(span >= ENOUGH for span in spans)
+
+
+def _between(track: Track | None, begin: float, end: float) -> Iterator[tuple[float, float, Pose2D]]:
+    """Time, duration [s] and pose of each step of a track from `begin` to `end`."""
+    if track is None:
+        return
+    for i, (time, pose) in enumerate(zip(track.times, track.poses, strict=True)):
+        if begin <= time <= end:
+            after = track.times[i + 1] if i + 1 < len(track.times) else time
+            yield time, min(after - time, _LONGEST), pose
+
+
+def _is_in_view(floor: Floor, person: Person, pose: Pose2D, robot: Pose2D | None) -> bool:
+    return robot is not None and floor.in_view(robot, pose, person.posture) >= RECOGNISED
 
 
 def place_error(tracks: dict[str, Track], people: Sequence[Person], time: float, x: float, y: float) -> float | None:

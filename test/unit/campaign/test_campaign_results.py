@@ -52,6 +52,9 @@ def test_an_interval_of_more_than_all_is_refused() -> None:
         ({**EMPTY, "verdict": "confirmed", "mails": 1}, ("false alarm",)),
         ({**EMPTY, "verdict": "unreachable"}, ("unreachable in a room without anybody",)),
         ({"mails": 2}, ("2 mails",)),
+        ({"people": 2}, ()),
+        ({"people": 2, "shown": 2}, ("1 mail for 2 people in view",)),
+        ({"people": 2, "shown": 2, "mails": 2}, ()),
         ({"contacts": ["sofa", "sofa"]}, ("touched sofa",)),
         ({"home": False}, ("not home",)),
         ({"place_error": 0.9}, ()),
@@ -72,6 +75,7 @@ def test_what_went_wrong_is_named(changes: dict[str, Any], failures: tuple[str, 
         ({**EMPTY, "verdict": "unverified"}, ()),
         ({**EMPTY, "verdict": "unreachable"}, ("unreachable in a room without anybody",)),
         ({**EMPTY, "verdict": "confirmed"}, ("false alarm", "0 mails")),
+        ({"people": 2, "shown": 2}, ()),
     ],
 )
 def test_what_broke_excuses_only_what_it_has_to(changes: dict[str, Any], failures: tuple[str, ...]) -> None:

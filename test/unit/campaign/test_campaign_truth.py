@@ -10,7 +10,7 @@ import pytest
 from rosbot_patrol.campaign.cast import Person
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.share import true_share
-from rosbot_patrol.campaign.truth import Track, place_error, presence, touches
+from rosbot_patrol.campaign.truth import Track, place_error, presence, shown, touches
 from rosbot_patrol.geometry import Pose2D
 
 ROOM, POINT = 1, (3.10, 3.15)  # the flat's living room
@@ -43,6 +43,16 @@ def test_a_wall_hides(flat_floor: Floor) -> None:
     towards = math.atan2(PLACE[1] - bath[1], PLACE[0] - bath[0])
     found = presence(flat_floor, ROOM, [BOB], {"bob": still(*PLACE)}, still(*bath, towards), begin=0.0, end=10.0)
     assert found.in_view == 0.0
+
+
+def test_people_are_counted_whom_the_camera_had_in_view_for_long_enough(flat_floor: Floor) -> None:
+    people = [BOB, Person(name="eve"), Person(name="away")]
+    short = Track([1.0, 1.2, 1.4], [Pose2D(*PLACE, 0.0)] * 3)
+    beside = still(PLACE[0], PLACE[1] + 0.5)
+    ahead = still(*POINT)
+    assert shown(flat_floor, people, {"bob": still(*PLACE), "eve": beside}, ahead, begin=0.0, end=10.0) == 2
+    assert shown(flat_floor, people, {"bob": still(*PLACE), "eve": short}, ahead, begin=0.0, end=10.0) == 1
+    assert shown(flat_floor, people, {"bob": still(*PLACE)}, ahead, begin=0.0, end=1.0) == 0
 
 
 def test_a_dog_does_not_count(flat_floor: Floor) -> None:

@@ -18,7 +18,7 @@ from rosbot_patrol.campaign.houses.files import HouseFiles, load_house
 from rosbot_patrol.campaign.plan import CONFIRMED, Patrol
 from rosbot_patrol.campaign.record import Result
 from rosbot_patrol.campaign.share import seen_floor, unseen_shares
-from rosbot_patrol.campaign.truth import Presence, Track, place_error, presence, touches
+from rosbot_patrol.campaign.truth import Presence, Track, place_error, presence, shown, touches
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.msg import Alert, PatrolState
 from rosbot_patrol.patrol.visibility.coverage import Coverage
@@ -190,6 +190,7 @@ def evaluate(patrol: Patrol, heard: Recording, files: HouseFiles, state_dir: Pat
         mishap=patrol.mishap,
         allowed=patrol.allowed,
         people=len(patrol.people),
+        shown=_shown(floor, patrol, tracks, robot, mission),
         mails=sum(mission.id is not None and mail.startswith(mission.id) for mail in run.mails),
         missions=len({s.message.mission for s in heard.states if s.message.mission}),
         sim_s=round(_last(robot), 1),
@@ -209,6 +210,15 @@ def _place_error(kept: Incident | None, patrol: Patrol, tracks: dict[str, Track]
     if kept is None or not kept.person:
         return None
     return place_error(tracks, patrol.people, time, *kept.person)
+
+
+def _shown(floor: Floor, patrol: Patrol, tracks: dict[str, Track], robot: Track, mission: Mission) -> int:
+    """Number of people whom the camera could see before the end of the look-around, 0 if it did not end."""
+    looked = mission.times().get("looked")
+    if looked is None:
+        return 0
+    begin = mission.triggered
+    return shown(floor, patrol.people, tracks, robot, begin=begin, end=begin + looked)
 
 
 def _seen(floor: Floor, room: int, robot: Track, mission: Mission) -> Coverage | None:
