@@ -38,9 +38,9 @@ def eye_at(pose: Pose2D) -> Eye:
     return Eye(pose=pose, width=WIDTH, columns=COLUMNS)
 
 
-def open_view(eye: Pose2D, *, length: float = 12.0, is_dark: bool = False) -> PictureView:
+def open_view(eye: Pose2D, *, length: float = 12.0, is_dark: bool = False, has_scan: bool = False) -> PictureView:
     sight = Sight(eye.x, eye.y, 0.0, math.tau / 360, np.full(360, length))
-    return PictureView(sight, is_dark)
+    return PictureView(sight, is_dark, has_scan)
 
 
 def box_of(
@@ -83,7 +83,8 @@ class Seen:
     def see(self, eye: Pose2D, *boxes: Box, pictures: int = 1, **given: object) -> list[Hypothesis]:
         """Look from a place; whom that confirms."""
         found = []
-        view = open_view(eye, length=given.pop("length", 12.0), is_dark=given.pop("is_dark", False))  # type: ignore[arg-type]
+        told = {key: given.pop(key) for key in ("length", "is_dark", "has_scan") if key in given}
+        view = open_view(eye, **told)  # type: ignore[arg-type]
         for _ in range(pictures):
             self.now += 0.1
             frame = Frame(stamp=self.now, eye=eye_at(eye), boxes=boxes, **given)  # type: ignore[arg-type]

@@ -50,10 +50,12 @@ class PictureView:
     Attributes:
         sight: free way around the camera, None if unknown: then a missing box tells nothing.
         is_dark: the picture is dark.
+        has_scan: the lidar sees, and would notice who walks.
     """
 
     sight: Sight | None = None
     is_dark: bool = False
+    has_scan: bool = False
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,8 @@ class Belief:
         self, at: float, boxes: Sequence[Box], frame: Frame, eye: Eye, view: PictureView
     ) -> list[Hypothesis]:
         shown = []
+        for hypothesis in self.hypotheses:
+            hypothesis.may_walk = hypothesis.moved > 0.0 or not view.has_scan
         for label in self._classes:
             of_class = [locate(box, eye, view.sight) for box in boxes if box.label == label]
             located = distinct(of_class, self.params)
@@ -189,6 +193,7 @@ class Belief:
             if known is None or apart > self.params.merge + self.params.gate * _TRACK_ERROR:
                 known = self._begin(place, spread, track.at)
             elif track.at > known.at:
+                known.may_walk = True
                 known.move(place, spread, track.at, self.params)
             if not known.moved:  # pictures of the place from before it came tell nothing
                 known.sides = [side for side in known.sides if side.score > 0.0]

@@ -130,7 +130,7 @@ class IntruderDecision:
         for frame in inputs.frames:
             if frame.stamp is not None and now - frame.stamp > _OLDEST:
                 continue
-            shown = self.belief.see(now, frame, PictureView(self._sight(inputs, frame.eye), frame.is_dark))
+            shown = self.belief.see(now, frame, self._view(inputs, frame))
             if shown:
                 self.pictures = self.belief.pictures(_PICTURES)
             findings += [self._find(now, each, inputs, frame.eye) for each in shown if each.is_confirmed]
@@ -139,6 +139,9 @@ class IntruderDecision:
             self._showing.append((now, bool(somebody) or is_early))
             self._point_camera(now, frame, somebody, inputs)
         return findings
+
+    def _view(self, inputs: Inputs, frame: Frame) -> PictureView:
+        return PictureView(self._sight(inputs, frame.eye), frame.is_dark, has_scan=inputs.scan is not None)
 
     def _sight(self, inputs: Inputs, eye: Eye | None) -> Sight | None:
         if inputs.house is None or eye is None:

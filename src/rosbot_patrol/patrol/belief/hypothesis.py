@@ -135,6 +135,7 @@ class Hypothesis:
         against, possible: boxes with each reason against a person, and boxes without one.
         place_veto: reason by its place, None if there is none; known: name of the known object there.
         moved: log-likelihood ratio of its motion, 0 where the lidar saw none.
+        may_walk: the lidar saw it move, or sees nothing; else it stays about where it is.
         is_confirmed: it was confirmed once, and stays so.
         second_looks: viewpoints that it was looked at from.
         scores: of its boxes; last: the newest one; measured: its newest measured place and size.
@@ -157,6 +158,7 @@ class Hypothesis:
     place_veto: Veto | None = None
     known: str = ""
     moved: float = 0.0
+    may_walk: bool = True
     is_confirmed: bool = False
     second_looks: list[Pose2D] = field(default_factory=list)
     scores: list[float] = field(default_factory=list)
@@ -260,21 +262,24 @@ class Hypothesis:
         return math.atan2(dy, dx), math.hypot(dx, dy)
 
     def spread_at(self, now: float, params: BeliefParams) -> Array:
-        """Covariance of the place at a later time [m2]; a person walks at most so fast, and so far."""
-        walked = min(params.speed * max(now - self.at, 0.0), params.walked_most)
-        return self.spread + np.eye(2) * (walked / 3.0) ** 2
+        """Covariance of the place at a later time [m2]."""
+        return self.spread + np.eye(2) * (self._walked(now, params) / 3.0) ** 2
 
     def move(self, place: Array, spread: Array, now: float, params: BeliefParams) -> None:
         """Take a measured place with its covariance (a Kalman update).
 
         A person who walks goes on in one direction: so the distance walked is one standard deviation here, not three.
         """
-        walked = min(params.speed * max(now - self.at, 0.0), params.walked_most)
-        before = self.spread + np.eye(2) * walked**2
+        before = self.spread + np.eye(2) * self._walked(now, params) ** 2
         gain = before @ np.linalg.inv(before + spread)
         self.place = self.place + gain @ (place - self.place)
         self.spread = (np.eye(2) - gain) @ before
         self.at = now
+
+    def _walked(self, now: float, params: BeliefParams) -> float:
+        """How far somebody may have walked since the place was measured [m]."""
+        most = params.walked_most if self.may_walk else params.merge
+        return min(params.speed * max(now - self.at, 0.0), most)
 
     def absorb(self, other: Hypothesis, params: BeliefParams) -> None:
         """Take in another hypothesis of the same object."""
@@ -290,6 +295,7 @@ class Hypothesis:
         self.together.pop(self.number, None)
         self.against += other.against
         self.moved = max(self.moved, other.moved)
+        self.may_walk |= other.may_walk
         self.is_confirmed |= other.is_confirmed
         self.seen_at = max(self.seen_at, other.seen_at)
 

@@ -164,6 +164,21 @@ def test_a_place_that_a_walker_has_left_tells_nothing() -> None:
     assert stood.posterior < 0.5 * before
 
 
+@pytest.mark.parametrize(
+    ("has_scan", "moves", "hypotheses"),
+    [(True, False, 2), (True, True, 1), (False, False, 1)],
+    ids=["the lidar sees nobody move", "the lidar saw it move", "no lidar"],
+)
+def test_who_the_lidar_does_not_see_move_is_not_elsewhere_later(has_scan: bool, moves: bool, hypotheses: int) -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST), pictures=5, has_scan=has_scan)
+    if moves:
+        seen.belief.motion([track(0.1, 0.0, seen.now + 0.05)])
+    seen.now += 8.0
+    seen.see(WEST, box_of(WEST, 1.0, 1.5, score=0.3), has_scan=has_scan)
+    assert len(seen.belief.hypotheses) == hypotheses
+
+
 def test_a_place_that_was_empty_before_somebody_came_is_no_evidence_against_them() -> None:
     seen = Seen()
     seen.see(WEST, box_of(WEST, score=0.15))
