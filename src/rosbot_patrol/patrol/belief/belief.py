@@ -154,7 +154,7 @@ class Belief:
                 self._take(hypothesis, each, frame, view, at)
                 shown.append(hypothesis)
         for a, b in combinations([h for h in shown if self.posterior(h) > _LIKELY], 2):
-            if _are_beside(a, b):
+            if self._are_beside(a, b):
                 a.together[b.number] += 1
                 b.together[a.number] += 1
         for hypothesis in self.hypotheses:
@@ -292,9 +292,19 @@ class Belief:
         self.hypotheses = kept
 
     def _is_one(self, a: Hypothesis, b: Hypothesis) -> bool:
-        if not (a.is_placed and b.is_placed) or a.label != b.label or a.number in b.others or _are_beside(a, b):
+        if not (a.is_placed and b.is_placed) or a.label != b.label or a.number in b.others or self._are_beside(a, b):
             return False
+        return self._are_close(a, b)
+
+    def _are_close(self, a: Hypothesis, b: Hypothesis) -> bool:
         return float(np.hypot(*(a.place - b.place))) < self.params.merge
+
+    def _are_beside(self, a: Hypothesis, b: Hypothesis) -> bool:
+        """Whether the newest picture of two is the same, and shows them in different columns, but not legs of one."""
+        if a.last is None or b.last is None or a.seen_at != b.seen_at or overlap(a.last, b.last):
+            return False
+        near = [m is not None and m.away < self.params.whole_from for m in (a.last.measured, b.last.measured)]
+        return not (all(near) and self._are_close(a, b))
 
     def _forget(self) -> None:
         """Keep the most probable ones."""
@@ -350,10 +360,3 @@ class Belief:
         if not floor_seen:
             return Judgement(Verdict.UNVERIFIED, "too little of the floor was seen")
         return Judgement(Verdict.CLEAR, "the floor was seen, and nobody is there")
-
-
-def _are_beside(a: Hypothesis, b: Hypothesis) -> bool:
-    """Whether the newest picture of two is the same, and shows them in different columns."""
-    if a.last is None or b.last is None:
-        return False
-    return a.seen_at == b.seen_at and not overlap(a.last, b.last)

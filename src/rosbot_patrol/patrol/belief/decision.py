@@ -126,6 +126,9 @@ class IntruderDecision:
         if inputs.house is not None:
             self.belief.floor = inputs.house.floor
         self.belief.motion(tracks)
+        for each in self.belief.hypotheses:
+            if each.moved > 0.0:
+                self._persons.walks(each.number)
         findings: list[Finding] = []
         for frame in inputs.frames:
             if frame.stamp is not None and now - frame.stamp > _OLDEST:

@@ -87,6 +87,11 @@ class Persons:
         person.sightings += 1
         return person, is_new
 
+    def walks(self, key: int) -> None:
+        """The lidar saw the person with this key move, if one was met."""
+        if key in self._by_key:
+            self._by_key[key].stays = False
+
     def _who(
         self, now: float, measured: Measured | None, others: Sequence[Person], eye: Pose2D | None, *, stays: bool
     ) -> Person | None:

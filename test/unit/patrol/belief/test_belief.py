@@ -330,6 +330,13 @@ def test_two_side_by_side_are_two() -> None:
     assert b.is_confirmed
 
 
+def test_two_legs_of_one_from_near_are_one() -> None:
+    near = Pose2D(-1.0, 0.0, 0.0)
+    seen = Seen()
+    seen.see(near, *(box_of(near, y=y, wide=0.2, is_cut=True, is_cut_above=True) for y in (0.25, -0.25)), pictures=8)
+    assert len(seen.belief.hypotheses) == 1
+
+
 @pytest.mark.parametrize(("pictures", "probability"), [(1, 0.9), (8, 0.3)], ids=["one picture", "a pet's boxes"])
 def test_a_box_that_shows_nobody_tells_no_two_apart(pictures: int, probability: float) -> None:
     """A box beside a person that is gone in the next picture, or as low as a pet: the person may walk there later."""

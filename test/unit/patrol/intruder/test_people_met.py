@@ -40,6 +40,14 @@ def test_of_two_whom_the_lidar_has_not_seen_move_neither_has_walked(first: bool,
     assert not people.note(20.1, at(4.4), key=3, stays=second)[1]
 
 
+def test_one_whom_the_lidar_saw_move_later_has_walked() -> None:
+    people = Persons()
+    people.note(0.0, at(0.0), key=1, stays=True)
+    people.walks(1)
+    people.walks(7)  # of whom nothing is known
+    assert not people.note(20.0, at(4.0), key=2, stays=True)[1]
+
+
 def test_one_whom_nobody_can_have_walked_to_is_another() -> None:
     people = Persons()
     people.note(0.0, at(0.0))
