@@ -197,8 +197,14 @@ class Hypothesis:
 
     @property
     def near(self) -> float:
-        """Log-likelihood ratio of views from near and of motion, which person and pet have in common."""
-        return sum(side.near for side in self.sides) + self.moved
+        """Log-likelihood ratio of views from near and of motion, which person and pet have in common.
+
+        From near a low camera shows legs, from whichever side. So somebody whose legs the network never finds is missed
+        from all of them: together they have the lower limit of one side.
+        """
+        told = [side.near for side in self.sides]
+        against = sum(each for each in told if each < 0.0)
+        return sum(each for each in told if each > 0.0) + max(against, math.log(_UNSEEN)) + self.moved
 
     @property
     def wholes(self) -> Array:

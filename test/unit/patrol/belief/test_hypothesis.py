@@ -76,6 +76,12 @@ def test_a_pet_that_fools_the_network_from_one_side_does_not_from_two_more() -> 
     assert three > 0.99
 
 
+def test_legs_that_the_network_does_not_find_are_missed_from_all_sides_together() -> None:
+    sides = [Side(WEST, near_sum=8.0), Side(SOUTH, near_sum=-3.0), Side(EAST, near_sum=-3.0)]
+    seen = Hypothesis(1, np.zeros(2), np.eye(2), 0.0, sides=sides, moved=1.0)
+    assert seen.near == pytest.approx(9.0 + math.log(0.03))
+
+
 def test_a_pet_that_looked_alike_from_near_and_whole_does_not_is_no_person() -> None:
     assert posterior(20.0, np.array([-10.0]), np.zeros(2), PARAMS, FOOLED) < 1e-3
 
