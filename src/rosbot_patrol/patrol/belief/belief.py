@@ -300,7 +300,7 @@ class Belief:
         return float(np.hypot(*(a.place - b.place))) < self.params.merge
 
     def _are_beside(self, a: Hypothesis, b: Hypothesis) -> bool:
-        """Whether the newest picture of two is the same, and shows them in different columns, but not legs of one."""
+        """Whether one picture, the newest of both, shows them in different columns, and not as the legs of one."""
         if a.last is None or b.last is None or a.seen_at != b.seen_at or overlap(a.last, b.last):
             return False
         near = [m is not None and m.away < self.params.whole_from for m in (a.last.measured, b.last.measured)]

@@ -199,8 +199,8 @@ class Hypothesis:
     def near(self) -> float:
         """Log-likelihood ratio of views from near and of motion, which person and pet have in common.
 
-        From near a low camera shows legs, from whichever side. So somebody whose legs the network never finds is missed
-        from all of them: together they have the lower limit of one side.
+        The camera is low: from near, every side shows the legs. Legs that the network never finds are missed from all
+        sides, so together these have the lower limit of one.
         """
         told = [side.near for side in self.sides]
         against = sum(each for each in told if each < 0.0)
