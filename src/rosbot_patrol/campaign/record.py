@@ -117,7 +117,7 @@ class Result:
         if not (self.missed or self.false_alarm or self.problem) and not self.was_there and not is_right:
             found.append(f"{self.verdict or 'no verdict'} in a room without anybody")
         if self.verdict == CONFIRMED and not self.has_its_mails:
-            in_view = f" for {self.shown} people in view" if self.mails < self.shown else ""
+            in_view = f" for {self.shown} people in view" if self.mails < self.shown > 1 else ""
             found.append(count_of(self.mails, "mail") + in_view)
         touched = self.touches or sorted(set(self.contacts))
         found += [f"touched {'; '.join(touched)}"] if self.contacts else []

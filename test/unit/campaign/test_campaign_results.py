@@ -52,6 +52,7 @@ def test_an_interval_of_more_than_all_is_refused() -> None:
         ({**EMPTY, "verdict": "confirmed", "mails": 1}, ("false alarm",)),
         ({**EMPTY, "verdict": "unreachable"}, ("unreachable in a room without anybody",)),
         ({"mails": 2}, ("2 mails",)),
+        ({"mails": 0, "shown": 1}, ("0 mails",)),
         ({"people": 2}, ()),
         ({"people": 2, "shown": 2}, ("1 mail for 2 people in view",)),
         ({"people": 2, "shown": 2, "mails": 2}, ()),
