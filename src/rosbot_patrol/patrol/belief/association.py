@@ -1,7 +1,7 @@
 """Which box belongs to which hypothesis: the likeliest by its place in the map, one box each, within a gate.
 
 A hypothesis has a normal distribution (Blackman and Popoli, Design and Analysis of Modern Tracking Systems, 1999, 6.2).
-By the Mahalanobis distance alone, somebody whose place is unsure would take the boxes of others.
+The Mahalanobis distance alone would give one whose place is unsure the boxes of others.
 
 Every box has a place with a covariance. One that was not measured lies somewhere along its bearing: about as far off as
 a person of its height would be, with an error of half that distance. So a bearing alone is a long, thin covariance.

@@ -301,7 +301,6 @@ class Hypothesis:
         self.together.pop(self.number, None)
         self.against += other.against
         self.moved = max(self.moved, other.moved)
-        self.may_walk |= other.may_walk
         self.is_confirmed |= other.is_confirmed
         self.seen_at = max(self.seen_at, other.seen_at)
 
