@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Pose2D, distance
 
 
 class GoalState(Enum):
@@ -27,7 +27,7 @@ _ENDINGS = {
     8: "the goal was called back",  # RECALLED
     9: "the goal was lost",
 }
-_NEARER = 0.15  # decrease of the distance that counts as progress [m]
+_NEARER = 0.15  # decrease of the distance that counts as progress, and a move that ends a standstill [m]
 SILENCE = 5.0  # time without a status after which the server of an action counts as down [s]
 
 
@@ -66,6 +66,25 @@ class Goal:
 
     tag: str
     pose: Pose2D
+
+
+class Standstill:
+    """How long a robot has been about where it is, turning or not."""
+
+    def __init__(self) -> None:
+        self._at: Pose2D | None = None
+        self._since = 0.0
+
+    def lasts(self, now: float, pose: Pose2D) -> float:
+        """Time about this place [s].
+
+        Args:
+            now: [s].
+            pose: of the robot.
+        """
+        if self._at is None or distance(pose, self._at) > _NEARER:
+            self._at, self._since = pose, now
+        return now - self._since
 
 
 class Progress:

@@ -32,7 +32,7 @@ class DriveParams:
         20.0,
         unit="s",
         lo=1.0,
-        doc="time without progress after which a robot that is in the room already looks from where it stands",
+        doc="time without progress after which a robot in the room, or bound for a viewpoint, looks where it stands",
     )
     retry_delay: float = param(2.0, unit="s", lo=0.0, doc="pause before the next attempt at a goal")
     server_wait: float = param(60.0, unit="s", lo=0.0, doc="longest total wait for move_base in one drive")

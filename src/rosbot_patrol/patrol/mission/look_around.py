@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 import math
 
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.goal import Standstill
 from rosbot_patrol.patrol.mission.drive import Drive, DriveParams
 from rosbot_patrol.patrol.mission.views import Views
 from rosbot_patrol.patrol.records.activity import Activity
@@ -14,6 +16,8 @@ from rosbot_patrol.patrol.records.mission import Mission
 from rosbot_patrol.patrol.search.look import Look, LookParams, LookStep
 from rosbot_patrol.patrol.search.turn import SpinParams
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
+
+log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -32,6 +36,7 @@ class _Approach:
 
     view: Viewpoint
     drive: Drive
+    standstill: Standstill = dataclasses.field(default_factory=Standstill)
 
 
 class LookAround:
@@ -64,6 +69,7 @@ class LookAround:
         """Interrupt the drive; the next step takes it up again."""
         if isinstance(self._doing, _Approach):
             self._doing.drive.pause()
+            self._doing = dataclasses.replace(self._doing, standstill=Standstill())
 
     def step(self, now: float, inputs: Inputs, *, candidate: bool, held: bool = False) -> LookStep:
         """Look on.
@@ -112,8 +118,14 @@ class LookAround:
         if step.problem:  # the room is not seen better than it is
             next_step = self._go_on(inputs, LookStep(done=True, why=step.problem))
             return dataclasses.replace(next_step, cancel=step.cancel)
-        if step.reached:
+        is_held = not step.waiting and self._is_held(approach, now, inputs.pose)
+        if is_held:
+            log.info("%s: held up on the way to a viewpoint, it looks from where it stands", self._mission.room.title)
+        if step.reached or is_held:
             turn = self._views.turn_from(inputs.pose, approach.view)
             self._doing = self._new_look(turn, approach.view.stay)
-            return LookStep(why="at a further viewpoint")
+            return LookStep(cancel=is_held, why="at a further viewpoint")
         return LookStep(speed=None, goal=step.goal, cancel=step.cancel, why=Activity.TO_VIEWPOINT.value)
+
+    def _is_held(self, approach: _Approach, now: float, pose: Pose2D | None) -> bool:
+        return pose is not None and approach.standstill.lasts(now, pose) > self._parts.drive.held_after
